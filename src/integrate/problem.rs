@@ -1,0 +1,137 @@
+//! What can be integrated, and what comes out.
+
+use crate::linear::SparsityPattern;
+
+/// A differential-algebraic system `0 = F(t, y, y'; theta)` of index 0, 1 or (in Gear-Gupta-Leimkuhler form) 2.
+///
+/// `n` = [`Dynamics::dimension`], `p` = [`Dynamics::parameter_count`]. Methods take `&mut self` so that an implementation may
+/// keep scratch memory. Non-finite results are allowed; the integrator treats them as a failed step.
+pub trait Dynamics {
+    fn dimension(&self) -> usize;
+
+    fn parameter_count(&self) -> usize;
+
+    /// True for components whose derivative appears in F; false for algebraic ones. Length n.
+    fn differential(&self) -> &[bool];
+
+    /// Typical magnitude per component (SI), the absolute tolerance is relative to it. Length n.
+    fn scale(&self) -> &[f64];
+
+    /// F into `residual`, length n.
+    fn residual(&mut self, t: f64, y: &[f64], y_prime: &[f64], residual: &mut [f64]);
+
+    /// Fixed pattern of dF/dy + c dF/dy', compressed sparse columns.
+    fn pattern(&self) -> &SparsityPattern;
+
+    /// Values of dF/dy + c dF/dy' in the order of [`Dynamics::pattern`].
+    fn jacobian(&mut self, t: f64, y: &[f64], y_prime: &[f64], c: f64, values: &mut [f64]);
+
+    /// dF/dtheta, n x p column-major.
+    fn parameter_derivative(&mut self, t: f64, y: &[f64], y_prime: &[f64], values: &mut [f64]);
+
+    /// For systems of the form `y' - f(t, y) = 0` without algebraic components: `f` into `rates`, and true.
+    /// Explicit methods need it.
+    fn explicit_rates(&mut self, _t: f64, _y: &[f64], _rates: &mut [f64]) -> bool {
+        false
+    }
+
+    /// Name of component `i` in the study's words, for messages.
+    fn component_name(&self, i: usize) -> String {
+        format!("y[{i}]")
+    }
+}
+
+/// Where the solution is wanted and how exactly.
+#[derive(Clone, Debug)]
+pub struct Options {
+    pub relative_tolerance: f64,
+    /// Absolute tolerance of component i = `relative_tolerance * absolute_factor * scale[i]`.
+    pub absolute_factor: f64,
+    /// Include the sensitivities in the error control.
+    pub control_sensitivities: bool,
+    pub method: MethodChoice,
+    pub maximum_steps: usize,
+    pub initial_step: Option<f64>,
+    pub maximum_step: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MethodChoice {
+    Automatic,
+    Bdf,
+    RungeKutta,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            relative_tolerance: 1e-6,
+            absolute_factor: 1e-3,
+            control_sensitivities: true,
+            method: MethodChoice::Automatic,
+            maximum_steps: 2_000_000,
+            initial_step: None,
+            maximum_step: None,
+        }
+    }
+}
+
+/// Start of an integration.
+#[derive(Clone, Debug)]
+pub struct Start {
+    pub time: f64,
+    /// Length n.
+    pub y: Vec<f64>,
+    /// Length n; consistent with `y`.
+    pub y_prime: Vec<f64>,
+    /// dy/dtheta at the start, n x p column-major; empty for a nominal run.
+    pub sensitivity: Vec<f64>,
+}
+
+/// The solution at the requested times (N of them).
+#[derive(Clone, Debug, Default)]
+pub struct Solution {
+    pub times: Vec<f64>,
+    /// N x n, row per time.
+    pub y: Vec<f64>,
+    /// N blocks of n x p column-major; empty for a nominal run.
+    pub sensitivity: Vec<f64>,
+    pub work: Work,
+}
+
+/// Counts of work.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    pub method: &'static str,
+    pub steps: usize,
+    pub rejected_error: usize,
+    pub rejected_newton: usize,
+    pub residuals: usize,
+    pub jacobians: usize,
+    pub factorisations: usize,
+    pub newton_iterations: usize,
+    /// Steps whose size was limited by component i.
+    pub limited_by: Vec<usize>,
+}
+
+/// Why an integration could not go on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    pub time: f64,
+    pub cause: FailureCause,
+    /// The component to blame, where one can be named.
+    pub component: Option<usize>,
+    pub work: Work,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailureCause {
+    /// The step shrank to rounding level.
+    StepTooSmall,
+    TooManySteps,
+    /// The solution grew without bound or the model returned a non-finite number.
+    NotFinite,
+    SingularMatrix,
+    InconsistentStart,
+    NoEquilibrium,
+}

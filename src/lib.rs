@@ -1,0 +1,42 @@
+//! `ident` shows what a mechanical simulation gets wrong against measured data, names the cause, extends the model
+//! and measures the gain.
+//!
+//! Data flows one way; each module is one stage and may use only modules above it in this list:
+//!
+//! ```text
+//! diagnostics  what is wrong in a text or a file: code, place, cause, likely fix
+//! quantities   dimensions, units, SI values
+//! expression   the symbolic graph
+//! linear       dense and sparse linear algebra, SVD
+//! syntax       text                -> Tree
+//! study        Tree                -> Study      names, dimensions, variants, topology
+//! mechanics    Study               -> System     equations of motion as expressions
+//! tape         System              -> Model      residual, sparse Jacobian, parameter derivatives as closures
+//! integrate    Model               -> Solution   equilibrium, BDF, sensitivities in step
+//! signal       files               -> records    measured data, filters, spectra
+//! simulation   Model + experiment  -> Trajectory measured channels and their gradient
+//! fit          residuals           -> estimate   cost, scaling, Levenberg-Marquardt with bounds
+//! statistics   estimate            -> confidence singular values, covariance, noise
+//! diagnose     study + data        -> Answer     what is wrong, why, and what the extension gains
+//! analyse      estimate            -> validity   criteria, planning
+//! report       results             -> terminal text, JSON, pages
+//! command      arguments           -> exit status
+//! ```
+
+pub mod analyse;
+pub mod command;
+pub mod diagnose;
+pub mod diagnostics;
+pub mod expression;
+pub mod fit;
+pub mod integrate;
+pub mod linear;
+pub mod mechanics;
+pub mod quantities;
+pub mod report;
+pub mod signal;
+pub mod simulation;
+pub mod statistics;
+pub mod study;
+pub mod syntax;
+pub mod tape;

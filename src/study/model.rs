@@ -1,0 +1,387 @@
+//! The checked study. All numbers are SI; all expressions are nodes of [`Study::graph`].
+
+use crate::diagnostics::Span;
+use crate::expression::{Graph, Node, Symbol};
+use crate::quantities::{Dimension, Unit};
+use std::path::PathBuf;
+
+/// A study with one variant applied; everything later stages need, nothing about how it was written but spans.
+#[derive(Clone, Debug)]
+pub struct Study {
+    pub name: String,
+    pub title: String,
+    /// `base` or the name of the variant that was applied.
+    pub variant: String,
+    /// Names of all variants declared in the text, `base` not included.
+    pub variants: Vec<String>,
+    pub graph: Graph,
+    /// The symbol `t`.
+    pub time: Symbol,
+    /// Gravitational acceleration in ground axes, m/s^2; zero where the study declares none.
+    pub gravity: [Node; 3],
+    pub parameters: Vec<Parameter>,
+    pub inputs: Vec<Input>,
+    pub bodies: Vec<Body>,
+    pub joints: Vec<Joint>,
+    pub forces: Vec<Force>,
+    /// Signals (controllers, filters, formulas): named values without a mechanical place.
+    pub signals: Vec<Signal>,
+    /// States of laws, signals, sensors and effects, in order of declaration.
+    pub states: Vec<State>,
+    pub measures: Vec<Measure>,
+    /// Symbols for coordinates of points that expressions mention.
+    pub point_quantities: Vec<PointQuantity>,
+    /// The tree of channel groups; the root is called `total`.
+    pub groups: Group,
+    pub experiments: Vec<Experiment>,
+    pub filter: Option<Filter>,
+    pub remove_mean: bool,
+    pub solver: Solver,
+    /// Numbers the study holds fixed and that an extension may free, e.g. `tyre.stiffness`.
+    pub constants: Vec<Constant>,
+    /// The catalogue of candidate effects: prelude, then the study's own.
+    pub effects: Vec<EffectDeclaration>,
+    /// Everything an effect can attach to.
+    pub places: Vec<Place>,
+}
+
+/// A parameter to identify.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    pub name: String,
+    pub symbol: Symbol,
+    /// As written; results are shown in it.
+    pub unit: Unit,
+    pub lower: f64,
+    pub upper: f64,
+    pub start: f64,
+    pub prior: Option<Prior>,
+    pub span: Span,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Prior {
+    pub mean: f64,
+    pub standard_deviation: f64,
+}
+
+/// A sampled input. Appears in expressions as `Operation::Sample { input: index in Study::inputs, .. }`.
+#[derive(Clone, Debug)]
+pub struct Input {
+    pub name: String,
+    pub title: String,
+    pub unit: Unit,
+    pub interpolation: Interpolation,
+    pub span: Span,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interpolation {
+    Hold,
+    Linear,
+    Cubic,
+}
+
+#[derive(Clone, Debug)]
+pub struct Body {
+    pub name: String,
+    pub mass: Node,
+    /// Centre of gravity in body axes, m.
+    pub centre_of_gravity: [Node; 3],
+    /// Inertia about the centre of gravity in body axes: xx, yy, zz, xy, xz, yz as tensor elements (products of
+    /// inertia with the tensor's sign, I_xy = -int x y dm), kg m^2.
+    pub inertia: [Node; 6],
+    pub points: Vec<Point>,
+    pub span: Span,
+}
+
+/// A named point of a body, in body axes (m).
+#[derive(Clone, Debug)]
+pub struct Point {
+    pub name: String,
+    pub position: [Node; 3],
+}
+
+/// Body index, `None` for ground; and the position in that body's axes (m).
+#[derive(Clone, Copy, Debug)]
+pub struct Attachment {
+    pub body: Option<usize>,
+    pub position: [Node; 3],
+}
+
+/// A joint. In the reference configuration (coordinate zero) the two attachments coincide and the bodies' axes are
+/// parallel. The joint turns or shifts `child` relative to `parent`.
+#[derive(Clone, Debug)]
+pub struct Joint {
+    pub name: String,
+    pub kind: JointKind,
+    pub parent: Attachment,
+    pub child: Attachment,
+    /// Symbols by which expressions refer to coordinate, rate and acceleration. `None` for fixed joints.
+    pub coordinate: Option<JointSymbols>,
+    pub span: Span,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct JointSymbols {
+    pub position: Symbol,
+    pub velocity: Symbol,
+    pub acceleration: Symbol,
+    /// The generalised inertia that the joint moves by itself: the child body's mass (prismatic) or its moment
+    /// of inertia about the joint axis (revolute), in the reference configuration.
+    pub inertia: Symbol,
+}
+
+/// Axis as unit vector in parent axes.
+#[derive(Clone, Copy, Debug)]
+pub enum JointKind {
+    Fixed,
+    Prismatic { axis: [f64; 3] },
+    Revolute { axis: [f64; 3] },
+}
+
+/// Translational places speak of length, velocity, force; rotational ones of angle, angular velocity, torque.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    Translational,
+    Rotational,
+}
+
+/// A force law with its place. `load` acts on the second body (or the joint's child) along the growing coordinate,
+/// and reversed on the first (or the parent).
+#[derive(Clone, Debug)]
+pub struct Force {
+    pub name: String,
+    /// The law's name, for messages.
+    pub law: String,
+    pub is_actuator: bool,
+    pub place: ForcePlace,
+    /// N or N m; in terms of `coordinate`, `rate`, joint symbols, states, parameters, inputs, time.
+    pub load: Node,
+    /// Symbols that mechanics replaces by the element's elongation and its rate.
+    pub coordinate: Symbol,
+    pub rate: Symbol,
+    pub span: Span,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub enum ForcePlace {
+    /// Along (prismatic) or about (revolute) the axis of joint `index`; elongation = the joint's coordinate.
+    Joint(usize),
+    /// Between two points. With `along`, the elongation is the displacement of the second against the first
+    /// along this ground-fixed unit vector, measured from the reference configuration. Without, it is the distance
+    /// of the points minus `free_length`.
+    Between { first: Attachment, second: Attachment, along: Option<[f64; 3]>, free_length: Option<Node> },
+}
+
+#[derive(Clone, Debug)]
+pub struct Signal {
+    pub name: String,
+    pub value: Node,
+    pub dimension: Dimension,
+    pub span: Span,
+}
+
+/// A first-order state of a law.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Dotted, e.g. `strut.z`.
+    pub name: String,
+    pub symbol: Symbol,
+    pub derivative: Node,
+    /// Value at the start when the experiment starts from rest; equilibrium replaces it.
+    pub initial: Node,
+    pub dimension: Dimension,
+    pub span: Span,
+}
+
+#[derive(Clone, Debug)]
+pub struct Measure {
+    pub name: String,
+    pub title: String,
+    pub unit: Unit,
+    /// May contain joint accelerations and point quantities.
+    pub value: Node,
+    /// Standard deviation of the noise in SI where the study states it.
+    pub noise: Option<f64>,
+    /// Further factor on the channel's residual; 1 unless stated.
+    pub weight: f64,
+    pub span: Span,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PointMotion {
+    Position,
+    Velocity,
+    Acceleration,
+}
+
+/// `symbol` stands for one ground-axis component of the motion of a point.
+#[derive(Clone, Debug)]
+pub struct PointQuantity {
+    pub symbol: Symbol,
+    pub point: Attachment,
+    pub motion: PointMotion,
+    /// 0, 1, 2 for x, y, z.
+    pub axis: usize,
+}
+
+#[derive(Clone, Debug)]
+pub struct Group {
+    pub name: String,
+    pub groups: Vec<Group>,
+    /// Indices into [`Study::measures`].
+    pub channels: Vec<usize>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Fitted and screened.
+    Estimation,
+    /// Decides whether an extension transfers.
+    Validation,
+    /// Looked at once, for the final figure.
+    Test,
+}
+
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    pub name: String,
+    pub role: Role,
+    /// As written, relative to the study's file (or to `--data DIR`).
+    pub data: PathBuf,
+    /// Column of the time; `t` unless stated.
+    pub time_column: String,
+    /// (input or measure name, column name) where they differ.
+    pub columns: Vec<(String, String)>,
+    /// Indices of the measures compared in this experiment (default: all).
+    pub measures: Vec<usize>,
+    /// Samples compared, s; the simulation starts at the record's first sample (or at `begin`).
+    pub window: Option<(f64, f64)>,
+    pub start: Start,
+    pub span: Span,
+    pub data_span: Span,
+}
+
+#[derive(Clone, Debug)]
+pub struct Start {
+    pub base: StartBase,
+    /// Joint positions/velocities or law states (by symbol) set to a value that may depend on parameters.
+    pub overrides: Vec<(Symbol, Node)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartBase {
+    Equilibrium,
+    /// Reference configuration at rest, law states at their declared `from` value.
+    Rest,
+}
+
+/// Low-pass Butterworth design by edges (Hz) and attenuations (dB, of the whole zero-phase operation unless
+/// `single_pass`).
+#[derive(Clone, Copy, Debug)]
+pub struct Filter {
+    pub pass: f64,
+    pub pass_drop: f64,
+    pub stop: f64,
+    pub stop_attenuation: f64,
+    pub single_pass_specification: bool,
+    pub span: Span,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Solver {
+    pub relative_tolerance: f64,
+    pub method: Method,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    Automatic,
+    Bdf,
+    RungeKutta,
+}
+
+/// A number given in the study for an element's property that is not identified.
+#[derive(Clone, Debug)]
+pub struct Constant {
+    /// Path usable as a target of `identify`, e.g. `tyre.stiffness`.
+    pub path: String,
+    pub value: f64,
+    pub unit: Unit,
+    pub span: Span,
+}
+
+/// What an effect may attach to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum PlaceKind {
+    Joint,
+    /// A force element that is no actuator.
+    Force,
+    Actuator,
+    Input,
+    Measure,
+    Signal,
+}
+
+#[derive(Clone, Debug)]
+pub struct Place {
+    pub kind: PlaceKind,
+    /// The element's name.
+    pub name: String,
+    /// For joints, forces, actuators.
+    pub motion: Option<Motion>,
+    /// Dimension of the value (input, measure, signal) or of the load.
+    pub dimension: Dimension,
+    /// Nodes for the place's typical magnitudes, where they exist: `coordinate`, `rate`, `load`, `value`.
+    /// For a joint, `load` is the sum of the loads acting on it (kinematic symbols included).
+    pub probes: Vec<(PlaceQuantity, Node)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum PlaceQuantity {
+    Coordinate,
+    Rate,
+    Load,
+    Value,
+    Time,
+}
+
+/// A candidate effect as declared; see the language reference.
+#[derive(Clone, Debug)]
+pub struct EffectDeclaration {
+    pub name: String,
+    pub title: String,
+    pub kinds: Vec<PlaceKind>,
+    /// Restricts to places of this motion.
+    pub motion: Option<Motion>,
+    /// `None`: any; else the dimension the place's value must have.
+    pub dimension: Option<Dimension>,
+    pub amplitudes: Vec<EffectParameter>,
+    pub shapes: Vec<EffectParameter>,
+    /// Shown with the candidate (`/// ...` in the declaration).
+    pub documentation: String,
+    pub is_prelude: bool,
+}
+
+/// An amplitude (zero means: not there) or a shape parameter of an effect.
+#[derive(Clone, Debug)]
+pub struct EffectParameter {
+    pub name: String,
+    /// The type as a monomial of place quantities, e.g. `load/rate^2` = [(Load, 1), (Rate, -2)]. Gives the dimension
+    /// at a place and, evaluated with typical magnitudes, the natural scale.
+    pub monomial: Vec<(PlaceQuantity, i8)>,
+    /// Fixed dimension where the type is not a place monomial (time, frequency, ratio).
+    pub dimension: Option<Dimension>,
+    /// Declared range (SI), absolute.
+    pub range: Option<(f64, f64)>,
+    /// Declared range relative to the natural scale, e.g. `0.01 .. 1 of rate`.
+    pub relative_range: Option<(f64, f64)>,
+    /// Only positive amplitudes make physical sense.
+    pub one_sided: bool,
+    /// Value at which the effect is absent: 0 for amplitudes unless declared (`neutral 1`).
+    pub neutral: f64,
+    /// The effect is not differentiable (or not defined) at its neutral value: scan finite strengths only.
+    pub finite_only: bool,
+    pub unit: Option<Unit>,
+}
