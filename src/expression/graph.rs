@@ -56,10 +56,18 @@ pub enum Operation {
     Unary(Unary, Node),
     Binary(Binary, Node, Node),
     /// `condition != 0 ? then : otherwise`.
-    Select { condition: Node, then: Node, otherwise: Node },
+    Select {
+        condition: Node,
+        then: Node,
+        otherwise: Node,
+    },
     /// The `order`-th time derivative of sampled input channel `input`, at an arbitrary time argument, so that
     /// a delayed input is `Sample { time: t - delay }` and differentiable with respect to the delay.
-    Sample { input: u32, order: u8, time: Node },
+    Sample {
+        input: u32,
+        order: u8,
+        time: Node,
+    },
 }
 
 /// Hash-consed arena of operations. Children always precede their parents, so ascending node order is an
