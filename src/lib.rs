@@ -17,6 +17,7 @@
 //! simulation   Model + experiment  -> Trajectory measured channels and their gradient
 //! fit          residuals           -> estimate   cost, scaling, Levenberg-Marquardt with bounds
 //! statistics   estimate            -> confidence singular values, covariance, noise
+//! identify     study + records     -> Identification  parameters with confidence, discrepancy tree
 //! diagnose     study + data        -> Answer     what is wrong, why, and what the extension gains
 //! analyse      estimate            -> validity   criteria, planning
 //! report       results             -> terminal text, JSON, pages
@@ -29,6 +30,7 @@ pub mod diagnose;
 pub mod diagnostics;
 pub mod expression;
 pub mod fit;
+pub mod identify;
 pub mod integrate;
 pub mod linear;
 pub mod mechanics;
