@@ -1,0 +1,138 @@
+//! The one table of diagnostic codes.
+//!
+//! A code is one line-block of the table below, kept under the heading of the stage that reports it; its explanation
+//! is what `ident explain` prints. To add a code, append a block to the stage's section.
+
+use std::fmt;
+
+/// What kind of finding a diagnostic reports. Compared by its text (`E0201`).
+#[derive(Clone, Copy)]
+pub struct Code {
+    /// `E0201`
+    pub text: &'static str,
+    /// A few words, for lists.
+    pub title: &'static str,
+    /// What it means, why it matters, what to do about it; plain text with examples.
+    pub explanation: &'static str,
+}
+
+impl Code {
+    /// The code with this text, e.g. `E0201` (upper or lower case).
+    pub fn find(text: &str) -> Option<Code> {
+        Code::ALL.iter().copied().find(|code| code.text.eq_ignore_ascii_case(text))
+    }
+}
+
+impl PartialEq for Code {
+    fn eq(&self, other: &Code) -> bool {
+        self.text == other.text
+    }
+}
+
+impl Eq for Code {}
+
+impl fmt::Display for Code {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.text)
+    }
+}
+
+impl fmt::Debug for Code {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.text)
+    }
+}
+
+macro_rules! codes {
+    ($( $name:ident $text:literal $title:literal $explanation:literal )*) => {
+        impl Code {
+            $(
+                #[doc = concat!("`", $text, "`: ", $title, ".")]
+                pub const $name: Code = Code { text: $text, title: $title, explanation: $explanation };
+            )*
+
+            /// Every code, in the order of the table.
+            pub const ALL: &'static [Code] = &[$(Code::$name),*];
+        }
+    };
+}
+
+codes! {
+    // ---- E01xx: the text cannot be read (syntax) ----
+
+    UNEXPECTED_TEXT "E0101" "unexpected text"
+    "The text does not follow the grammar at the marked place. The message says what could stand there.\n\
+     A declaration starts with its keyword and ends at the end of its line or with its closing brace:\n\
+     \n    body wheel { mass = 45 kg }\n"
+
+    UNKNOWN_KEYWORD "E0102" "unknown declaration"
+    "A declaration must start with one of the keywords of the language (`body`, `joint`, `force`, `measure`, ...).\n"
+
+    UNCLOSED "E0103" "missing closing brace"
+    "A brace, parenthesis, bracket or quotation mark is opened but never closed. Reading goes on at the next\n\
+     declaration that starts at the beginning of a line.\n"
+
+    TOO_DEEP "E0104" "nested too deeply or too large"
+    "Expressions and blocks may be nested up to a fixed depth, and files up to a fixed size; generated text that\n\
+     exceeds it is refused instead of exhausting the memory. Split the expression with `let`, the file with `use`.\n"
+
+    NOT_YET "E0105" "not yet part of the language"
+    "The construct is reserved: it is planned but this version does not read it.\n"
+
+    BAD_NUMBER "E0106" "not a number"
+    "Numbers are written like `12`, `0.5`, `1.2e-3`, followed by their unit: `12 kN/m`.\n"
+
+    REPEATED_CLAUSE "E0107" "written twice"
+    "A clause that may stand once is written twice, e.g. two `lowpass` designs in one filter.\n"
+
+    // ---- E02xx: names, quantities, dimensions, structure of the study ----
+
+    UNKNOWN_NAME "E0201" "unknown name"
+    "The name is not declared in the study, its `use`d files or the prelude. Declarations may stand in any order;\n\
+     a similar name is suggested where there is one.\n"
+
+    UNKNOWN_UNIT "E0202" "unknown unit"
+    "The unit is not known. Units are symbols of the SI with prefixes (`kN`, `mm`, `ms`), some common others\n\
+     (`bar`, `rpm`, `deg`, `km/h`, `g0`), and products and powers of them: `kN*s/m`, `N*m/rad`, `m/s^2`.\n"
+
+    DIMENSION_MISMATCH "E0203" "dimensions do not agree"
+    "Only quantities of the same dimension can be added, compared or assigned. Both places are marked.\n"
+
+    // ---- E03xx: mechanics ----
+
+    // ---- E04xx: data files and signals ----
+
+    // ---- E05xx: simulation ----
+
+    // ---- E06xx: fit and diagnosis ----
+
+    // ---- E07xx: command line ----
+
+    CANNOT_READ_FILE "E0701" "file cannot be read"
+    "The file does not exist, may not be read, or is not UTF-8 text. The message names the reason given by the system.\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Code;
+
+    #[test]
+    fn codes_are_unique_well_formed_and_explained() {
+        let mut texts: Vec<&str> = Code::ALL.iter().map(|code| code.text).collect();
+        texts.sort_unstable();
+        texts.dedup();
+        assert_eq!(texts.len(), Code::ALL.len(), "a code is used twice");
+        for code in Code::ALL {
+            let digits = code.text.strip_prefix('E').expect("codes start with E");
+            assert!(digits.len() == 4 && digits.bytes().all(|byte| byte.is_ascii_digit()), "{code}");
+            assert!(!code.title.is_empty() && code.title.len() < 60, "{code}");
+            assert!(code.explanation.len() > 40 && code.explanation.ends_with('\n'), "{code}");
+        }
+    }
+
+    #[test]
+    fn find_ignores_case_and_knows_its_limits() {
+        assert_eq!(Code::find("e0201"), Some(Code::UNKNOWN_NAME));
+        assert_eq!(Code::find("E9999"), None);
+    }
+}

@@ -1,0 +1,35 @@
+//! Suggestions for misspelt names.
+
+/// The candidate most like `name`, when it is near enough to be what was meant. Of equally near ones the first.
+pub fn similar_name<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let wanted = name.to_lowercase();
+    let mut best: Option<(usize, &str)> = None;
+    for candidate in candidates {
+        let distance = strsim::damerau_levenshtein(&wanted, &candidate.to_lowercase());
+        if distance <= tolerance(&wanted, candidate) && best.is_none_or(|(nearest, _)| distance < nearest) {
+            best = Some((distance, candidate));
+        }
+    }
+    best.map(|(_, candidate)| candidate)
+}
+
+/// Edits that still count as a slip: one in three letters of the shorter word. A wholly different letter case is no edit.
+fn tolerance(name: &str, candidate: &str) -> usize {
+    name.chars().count().min(candidate.chars().count()).div_ceil(3).min(3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::similar_name;
+
+    #[test]
+    fn slips_are_recognised_and_other_words_are_not() {
+        let bodies = ["wheel", "chassis", "table"];
+        assert_eq!(similar_name("whel", bodies), Some("wheel"));
+        assert_eq!(similar_name("CHASSIS", bodies), Some("chassis"));
+        assert_eq!(similar_name("chasiss", bodies), Some("chassis"));
+        assert_eq!(similar_name("engine", bodies), None);
+        assert_eq!(similar_name("", bodies), None);
+        assert_eq!(similar_name("x", []), None);
+    }
+}
