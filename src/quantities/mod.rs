@@ -1,20 +1,15 @@
 //! Dimensions, units, SI as data.
+//!
+//! *In*: units as text (`kN*s/m`). *Out*: [`Unit`]s that convert to and from SI, [`Dimension`]s and their algebra, the
+//! named types of the language. *Must not happen here*: knowledge of studies, places or expressions.
 
-/// Exponents of kg, m, s, A, K. Angles are dimensionless.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-pub struct Dimension {
-    pub mass: i8,
-    pub length: i8,
-    pub time: i8,
-    pub current: i8,
-    pub temperature: i8,
-}
+mod dimension;
+mod parse;
+mod symbols;
+mod types;
+mod unit;
 
-/// A unit as written, with its conversion `SI = factor * value + offset`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Unit {
-    pub symbol: String,
-    pub dimension: Dimension,
-    pub factor: f64,
-    pub offset: f64,
-}
+pub use dimension::Dimension;
+pub use parse::UnitError;
+pub use types::{NAMED_TYPES, NamedType, named_type};
+pub use unit::{AngleContent, Unit, format_number};
