@@ -1,1 +1,16 @@
-//! (contract follows)
+//! Minimisation of weighted residuals over bounded parameters, and the cost that it minimises.
+//!
+//! *In*: a [`LeastSquares`] problem (residuals and their gradient as functions of the parameters), a start, bounds.
+//! *Out*: an [`Estimate`], whatever happens on the way; only a start that cannot be evaluated is a [`FitError`].
+//! *Must not happen here*: simulation, files, knowledge of bodies or names of channels.
+
+mod levenberg_marquardt;
+mod multi_start;
+mod prior;
+mod problem;
+mod step;
+
+pub use levenberg_marquardt::levenberg_marquardt;
+pub use multi_start::{latin_hypercube, multi_start};
+pub use prior::{GaussianPrior, WithPriors};
+pub use problem::*;
