@@ -102,6 +102,51 @@ codes! {
 
     // ---- E04xx: data files and signals ----
 
+    DATA_FILE_UNREADABLE "E0401" "data file cannot be read"
+    "The measured data are CSV text: one head line with `name [unit]` per column, then one line per sample. The file is\n\
+     missing, may not be read, or is no text. Paths are relative to the study's file, or to `--data DIR`.\n"
+
+    DATA_EMPTY "E0402" "data file without samples"
+    "The file holds no head line or no line of numbers below it.\n"
+
+    DATA_NOT_A_NUMBER "E0403" "cell is not a number"
+    "Every cell of a used column must hold a number, with decimal point, or decimal comma where columns are separated by\n\
+     semicolons or tabs. No value is made up for an empty or unreadable cell: mend or cut the record.\n"
+
+    DATA_NOT_FINITE "E0404" "sample is NaN or infinite"
+    "A used column holds `NaN` or an infinite value. Samples are never skipped or replaced: mend the record, or choose a\n\
+     `window` without the gap and cut the file there.\n"
+
+    DATA_COLUMN_MISSING "E0405" "column is missing"
+    "The experiment needs a column that the data file does not have. Columns are found by the name of the input or measure,\n\
+     or by the experiment's `columns = { name = \"head in the file\" }`.\n"
+
+    DATA_TIME_ORDER "E0406" "time does not increase"
+    "The time column must grow from line to line. Repeated or backward stamps mean lost or doubled lines, or two records\n\
+     written into one file.\n"
+
+    DATA_NOT_UNIFORM "E0407" "samples are not equidistant"
+    "Filters and spectra need equidistant samples. Small jitter of the stamps (5 % of a step) is accepted; a gap or a\n\
+     changing rate is not: resample the record, or cut it at the gap.\n"
+
+    DATA_CONSTANT "E0408" "channel is constant"
+    "A measured channel that never changes holds no information to compare with: a dead sensor, a wrong column, or a\n\
+     window in which nothing happens.\n"
+
+    DATA_TOO_SHORT "E0409" "too few samples"
+    "The record, or the part of it inside the `window`, has too few samples for what is asked of it.\n"
+
+    DATA_UNIT "E0410" "unit of a column does not fit"
+    "The head of a column names its unit: `force [kN]`. It is converted to the unit of the study; it must measure the same\n\
+     kind of quantity, and it must be there unless the quantity is dimensionless.\n"
+
+    DATA_LAYOUT "E0411" "table is not rectangular or its head is unclear"
+    "Every line needs as many cells as the head has columns, and every head its own name.\n"
+
+    FILTER_IMPOSSIBLE "E0412" "filter cannot be designed"
+    "A low-pass is given by its pass edge, stop edge and the attenuations there: pass below stop, stop below half the\n\
+     sampling rate, pass-band drop below stop-band attenuation.\n"
+
     // ---- E05xx: simulation ----
 
     // ---- E06xx: fit and diagnosis ----

@@ -1,1 +1,13 @@
-//! (contract follows)
+//! Measured data: files, interpolation, filters, spectra.
+//!
+//! *In*: CSV files ([`read_table`]), filter specifications. *Out*: columns in SI with their sampling, interpolants of
+//! sampled inputs, linear prefilters, spectra and tests of residuals. *Must not happen here*: simulation, knowledge of
+//! studies beyond names and units; missing samples are never made up.
+
+mod filter;
+mod interpolation;
+mod records;
+
+pub use filter::{Butterworth, FilterError, LowPass, Passes, Prefilter, Section};
+pub use interpolation::Interpolant;
+pub use records::{Column, DataError, Sampling, Table, read_table};
