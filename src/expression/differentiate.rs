@@ -1,7 +1,14 @@
 //! Symbolic derivatives, forward through the graph.
 
 use super::graph::{Binary, Graph, Node, Operation, Symbol, Unary};
-use std::collections::HashMap;
+
+/// One structurally non-zero element of a matrix of derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    pub row: usize,
+    pub column: usize,
+    pub value: Node,
+}
 
 impl Graph {
     /// d(root)/d(symbol) for every root.
@@ -10,40 +17,55 @@ impl Graph {
     /// comparisons have derivative zero.
     pub fn differentiate(&mut self, roots: &[Node], symbol: Symbol) -> Vec<Node> {
         let zero = self.constant(0.0);
-        let mut derivative: HashMap<Node, Node> = HashMap::new();
-        for node in self.reachable(roots) {
-            let d = |child: Node| derivative.get(&child).copied().unwrap_or(zero);
-            let value = match self.operation(node) {
-                Operation::Constant(_) => zero,
-                Operation::Symbol(s) if s == symbol => self.constant(1.0),
-                Operation::Symbol(_) => zero,
-                Operation::Unary(function, a) => {
-                    let da = d(a);
-                    self.unary_derivative(function, node, a, da)
+        let order = self.reachable(roots);
+        let mut derivative = vec![zero; self.len()];
+        self.sweep(&order, symbol, zero, &mut derivative);
+        roots.iter().map(|root| derivative[root.index()]).collect()
+    }
+
+    /// The structurally non-zero elements of d(roots)/d(symbols), ordered by column, then row.
+    pub fn jacobian(&mut self, roots: &[Node], symbols: &[Symbol]) -> Vec<Entry> {
+        let zero = self.constant(0.0);
+        let order = self.reachable(roots);
+        let mut derivative = vec![zero; self.len()];
+        let mut entries = Vec::new();
+        for (column, &symbol) in symbols.iter().enumerate() {
+            derivative.fill(zero);
+            self.sweep(&order, symbol, zero, &mut derivative);
+            let values = roots.iter().map(|root| derivative[root.index()]).enumerate();
+            entries.extend(
+                values.filter(|&(_, value)| value != zero).map(|(row, value)| Entry { row, column, value }),
+            );
+        }
+        entries
+    }
+
+    /// Derivatives of the nodes in `order` into `derivative`, which holds `zero` everywhere.
+    fn sweep(&mut self, order: &[Node], symbol: Symbol, zero: Node, derivative: &mut [Node]) {
+        for &node in order {
+            let operation = self.operation(node);
+            if let Operation::Symbol(s) = operation {
+                if s == symbol {
+                    derivative[node.index()] = self.constant(1.0);
                 }
-                Operation::Binary(function, a, b) => {
-                    let (da, db) = (d(a), d(b));
-                    self.binary_derivative(function, node, [a, b], [da, db])
-                }
-                Operation::Select { condition, then, otherwise } => {
-                    let (dt, de) = (d(then), d(otherwise));
-                    self.select(condition, dt, de)
-                }
+                continue;
+            }
+            let d = |child: Node| derivative[child.index()];
+            if operation.children().all(|child| d(child) == zero) {
+                continue;
+            }
+            let value = match operation {
+                Operation::Constant(_) | Operation::Symbol(_) => zero,
+                Operation::Unary(function, a) => self.unary_derivative(function, node, a, d(a)),
+                Operation::Binary(function, a, b) => self.binary_derivative(function, node, [a, b], [d(a), d(b)]),
+                Operation::Select { condition, then, otherwise } => self.select(condition, d(then), d(otherwise)),
                 Operation::Sample { input, order, time } => {
-                    let dt = d(time);
-                    if dt == zero {
-                        zero
-                    } else {
-                        let slope = self.sample(input, order + 1, time);
-                        self.multiply(slope, dt)
-                    }
+                    let slope = self.sample(input, order + 1, time);
+                    self.multiply(slope, d(time))
                 }
             };
-            if value != zero {
-                derivative.insert(node, value);
-            }
+            derivative[node.index()] = value;
         }
-        roots.iter().map(|root| derivative.get(root).copied().unwrap_or(zero)).collect()
     }
 
     fn unary_derivative(&mut self, function: Unary, node: Node, a: Node, da: Node) -> Node {
@@ -127,7 +149,8 @@ impl Graph {
         }
     }
 
-    /// d(a^b) = b a^(b-1) da + a^b log(a) db, the second part only where the exponent varies.
+    /// d(a^b) = b a^(b-1) da + a^b log(a) db, the second part only where the exponent varies; at base zero it is
+    /// zero (the limit for positive exponents), not the 0 * infinity of the formula.
     fn power_derivative(&mut self, node: Node, [a, b]: [Node; 2], [da, db]: [Node; 2]) -> Node {
         let one = self.constant(1.0);
         let lowered = self.subtract(b, one);
@@ -139,7 +162,10 @@ impl Graph {
         }
         let log = self.unary(Unary::Log, a);
         let scaled = self.multiply(node, log);
-        let by_exponent = self.multiply(scaled, db);
+        let zero = self.constant(0.0);
+        let is_positive = self.binary(Binary::Less, zero, a);
+        let guarded = self.select(is_positive, scaled, zero);
+        let by_exponent = self.multiply(guarded, db);
         self.add(by_base, by_exponent)
     }
 }

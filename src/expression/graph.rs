@@ -1,5 +1,6 @@
 //! The arena of nodes.
 
+use rustc_hash::FxHashMap;
 use std::collections::HashMap;
 
 /// A node of a [`Graph`]; meaningless without it.
@@ -75,9 +76,9 @@ pub enum Operation {
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
     operations: Vec<Operation>,
-    index: HashMap<Operation, Node>,
+    index: FxHashMap<Operation, Node>,
     symbol_names: Vec<String>,
-    symbol_index: HashMap<String, Symbol>,
+    symbol_index: FxHashMap<String, Symbol>,
 }
 
 impl Graph {
@@ -191,7 +192,8 @@ impl Graph {
 
     /// All nodes that `roots` need, each once, children before parents.
     pub fn reachable(&self, roots: &[Node]) -> Vec<Node> {
-        let mut needed = vec![false; self.operations.len()];
+        let size = roots.iter().map(|root| root.index() + 1).max().unwrap_or(0);
+        let mut needed = vec![false; size];
         let mut stack: Vec<Node> = roots.to_vec();
         while let Some(node) = stack.pop() {
             if std::mem::replace(&mut needed[node.0 as usize], true) {
@@ -199,7 +201,7 @@ impl Graph {
             }
             stack.extend(self.operation(node).children());
         }
-        (0..self.operations.len() as u32).map(Node).filter(|n| needed[n.0 as usize]).collect()
+        (0..size as u32).map(Node).filter(|n| needed[n.index()]).collect()
     }
 
     /// The symbols that `roots` depend on, in order of symbol creation.
@@ -218,25 +220,93 @@ impl Graph {
 
     /// `roots` with symbols replaced by nodes (simultaneously; replacements are not substituted again).
     pub fn substitute(&mut self, roots: &[Node], replacements: &HashMap<Symbol, Node>) -> Vec<Node> {
-        let mut image: HashMap<Node, Node> = HashMap::new();
+        let mut image: Vec<Node> = (0..self.operations.len() as u32).map(Node).collect();
         for node in self.reachable(roots) {
-            let new = match self.operation(node) {
-                Operation::Constant(_) => node,
-                Operation::Symbol(symbol) => replacements.get(&symbol).copied().unwrap_or(node),
-                Operation::Unary(function, a) => self.unary(function, image[&a]),
-                Operation::Binary(function, a, b) => self.binary(function, image[&a], image[&b]),
-                Operation::Select { condition, then, otherwise } => {
-                    self.select(image[&condition], image[&then], image[&otherwise])
-                }
-                Operation::Sample { input, order, time } => self.sample(input, order, image[&time]),
-            };
-            image.insert(node, new);
+            let of = |child: Node| image[child.index()];
+            let operation = self.operation(node);
+            if let Operation::Symbol(symbol) = operation {
+                image[node.index()] = replacements.get(&symbol).copied().unwrap_or(node);
+            } else if operation.children().any(|child| of(child) != child) {
+                let new = self.rebuild(operation, of);
+                image[node.index()] = new;
+            }
         }
-        roots.iter().map(|root| image[root]).collect()
+        roots.iter().map(|root| image[root.index()]).collect()
+    }
+
+    /// A graph of its own with only what `roots` need, same symbols; and the roots in it.
+    pub fn extract(&self, roots: &[Node]) -> (Graph, Vec<Node>) {
+        let needed = self.reachable(roots);
+        let mut graph = Graph {
+            operations: Vec::with_capacity(2 * needed.len()),
+            index: FxHashMap::with_capacity_and_hasher(2 * needed.len(), Default::default()),
+            symbol_names: self.symbol_names.clone(),
+            symbol_index: self.symbol_index.clone(),
+        };
+        let mut image: Vec<Node> = vec![Node(0); self.operations.len()];
+        for node in needed {
+            let operation = self.operation(node).map_children(|child| image[child.index()]);
+            image[node.index()] = graph.intern(operation);
+        }
+        (graph, roots.iter().map(|root| image[root.index()]).collect())
+    }
+
+    /// Values of `roots` where symbols and input samples have the given values. For checks at single points;
+    /// repeated evaluation is the business of tapes.
+    pub fn evaluate(
+        &self,
+        roots: &[Node],
+        symbol: impl Fn(Symbol) -> f64,
+        sample: impl Fn(u32, u8, f64) -> f64,
+    ) -> Vec<f64> {
+        let mut value = vec![0.0; self.operations.len()];
+        for node in self.reachable(roots) {
+            value[node.index()] = match self.operation(node) {
+                Operation::Constant(bits) => f64::from_bits(bits),
+                Operation::Symbol(s) => symbol(s),
+                Operation::Unary(function, a) => function.evaluate(value[a.index()]),
+                Operation::Binary(function, a, b) => function.evaluate(value[a.index()], value[b.index()]),
+                Operation::Select { condition, then, otherwise } => {
+                    value[if value[condition.index()] != 0.0 { then } else { otherwise }.index()]
+                }
+                Operation::Sample { input, order, time } => sample(input, order, value[time.index()]),
+            };
+        }
+        roots.iter().map(|root| value[root.index()]).collect()
+    }
+
+    /// `operation` with other operands, simplified.
+    fn rebuild(&mut self, operation: Operation, of: impl Fn(Node) -> Node) -> Node {
+        match operation {
+            Operation::Constant(_) | Operation::Symbol(_) => self.intern(operation),
+            Operation::Unary(function, a) => self.unary(function, of(a)),
+            Operation::Binary(function, a, b) => self.binary(function, of(a), of(b)),
+            Operation::Select { condition, then, otherwise } => self.select(of(condition), of(then), of(otherwise)),
+            Operation::Sample { input, order, time } => self.sample(input, order, of(time)),
+        }
+    }
+}
+
+impl Node {
+    /// Position in the graph's order of evaluation, below [`Graph::len`].
+    pub fn index(self) -> usize {
+        self.0 as usize
     }
 }
 
 impl Operation {
+    fn map_children(self, of: impl Fn(Node) -> Node) -> Operation {
+        match self {
+            Operation::Constant(_) | Operation::Symbol(_) => self,
+            Operation::Unary(function, a) => Operation::Unary(function, of(a)),
+            Operation::Binary(function, a, b) => Operation::Binary(function, of(a), of(b)),
+            Operation::Select { condition, then, otherwise } => {
+                Operation::Select { condition: of(condition), then: of(then), otherwise: of(otherwise) }
+            }
+            Operation::Sample { input, order, time } => Operation::Sample { input, order, time: of(time) },
+        }
+    }
+
     /// The nodes this operation reads.
     pub fn children(self) -> impl Iterator<Item = Node> {
         let list = match self {

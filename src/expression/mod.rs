@@ -13,4 +13,5 @@ mod graph;
 mod print;
 mod simplify;
 
+pub use differentiate::Entry;
 pub use graph::{Binary, Graph, Node, Operation, Symbol, Unary};

@@ -1,4 +1,7 @@
 //! The rule table that is applied whenever a node is built.
+//!
+//! Rules keep the value up to rounding wherever all operands are finite. `0 x = 0`, `x - x = 0` and `x / x = 1` also hold where
+//! the unsimplified form would be undefined: a structural zero must vanish whatever it multiplies.
 
 use super::graph::{Binary, Graph, Node, Operation, Unary};
 
@@ -11,11 +14,17 @@ pub(super) fn unary(graph: &mut Graph, function: Unary, argument: Node) -> Node 
         (Unary::Negate, Operation::Unary(Unary::Negate, inner)) => inner,
         (Unary::Negate, Operation::Binary(Binary::Subtract, a, b)) => graph.subtract(b, a),
         (Unary::Abs, Operation::Unary(Unary::Negate | Unary::Abs, inner)) => graph.unary(Unary::Abs, inner),
-        (Unary::Cos, Operation::Unary(Unary::Negate, inner)) => graph.unary(Unary::Cos, inner),
-        (Unary::Sin | Unary::Tanh, Operation::Unary(Unary::Negate, inner)) => {
-            let positive = graph.unary(function, inner);
-            graph.negate(positive)
+        (Unary::Cos | Unary::Cosh, Operation::Unary(Unary::Negate, inner)) => graph.unary(function, inner),
+        (Unary::Sin | Unary::Tan | Unary::Tanh | Unary::Sinh | Unary::Atan | Unary::Asin | Unary::Sign, _)
+            if negated(graph, argument).is_some() =>
+        {
+            let positive = negated(graph, argument).unwrap_or(argument);
+            let value = graph.unary(function, positive);
+            graph.negate(value)
         }
+        (Unary::Sign, Operation::Unary(Unary::Sign, _)) => argument,
+        (Unary::Floor, Operation::Unary(Unary::Floor, _)) => argument,
+        (Unary::Sqrt, Operation::Binary(Binary::Multiply, a, b)) if a == b => graph.unary(Unary::Abs, a),
         _ => graph.intern(Operation::Unary(function, argument)),
     }
 }
@@ -33,6 +42,8 @@ pub(super) fn binary(graph: &mut Graph, function: Binary, left: Node, right: Nod
         Binary::Divide => divide(graph, left, right, a, b),
         Binary::Power => power(graph, left, right, b),
         Binary::Minimum | Binary::Maximum if left == right => left,
+        Binary::Minimum | Binary::Maximum if left > right => graph.intern(Operation::Binary(function, right, left)),
+        Binary::Less if left == right => graph.constant(0.0),
         _ => graph.intern(Operation::Binary(function, left, right)),
     }
 }
@@ -54,6 +65,48 @@ fn negated(graph: &Graph, node: Node) -> Option<Node> {
     }
 }
 
+/// `(c, x)` of `c + x` with constant c; constants may stand on either side.
+fn constant_sum(graph: &Graph, node: Node) -> Option<(f64, Node)> {
+    match graph.operation(node) {
+        Operation::Binary(Binary::Add, a, b) => match (graph.constant_value(a), graph.constant_value(b)) {
+            (Some(c), _) => Some((c, b)),
+            (_, Some(c)) => Some((c, a)),
+            _ => None,
+        },
+        Operation::Binary(Binary::Subtract, a, b) => graph.constant_value(b).map(|c| (-c, a)),
+        _ => None,
+    }
+}
+
+/// `(c, x)` of `c x` with constant c.
+fn constant_product(graph: &Graph, node: Node) -> Option<(f64, Node)> {
+    match graph.operation(node) {
+        Operation::Binary(Binary::Multiply, a, b) => match (graph.constant_value(a), graph.constant_value(b)) {
+            (Some(c), _) => Some((c, b)),
+            (_, Some(c)) => Some((c, a)),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// The angle of `sin(angle)^2` or `cos(angle)^2`.
+fn squared(graph: &Graph, node: Node, function: Unary) -> Option<Node> {
+    match graph.operation(node) {
+        Operation::Binary(Binary::Multiply, a, b) if a == b => match graph.operation(a) {
+            Operation::Unary(f, angle) if f == function => Some(angle),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+fn is_sine_and_cosine_squared(graph: &Graph, left: Node, right: Node) -> bool {
+    let sine_first = squared(graph, left, Unary::Sin).zip(squared(graph, right, Unary::Cos));
+    let cosine_first = squared(graph, left, Unary::Cos).zip(squared(graph, right, Unary::Sin));
+    sine_first.or(cosine_first).is_some_and(|(a, b)| a == b)
+}
+
 fn add(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Option<f64>) -> Node {
     if a == Some(0.0) {
         return right;
@@ -66,6 +119,19 @@ fn add(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Option<f64
     }
     if let Some(inner) = negated(graph, left) {
         return graph.subtract(right, inner);
+    }
+    for (constant, other) in [(a, right), (b, left)] {
+        if let (Some(c), Some((inner, rest))) = (constant, constant_sum(graph, other)) {
+            let sum = graph.constant(c + inner);
+            return graph.add(sum, rest);
+        }
+    }
+    if is_sine_and_cosine_squared(graph, left, right) {
+        return graph.constant(1.0);
+    }
+    if left == right {
+        let two = graph.constant(2.0);
+        return graph.multiply(two, left);
     }
     let (first, second) = if left <= right { (left, right) } else { (right, left) };
     graph.intern(Operation::Binary(Binary::Add, first, second))
@@ -84,7 +150,31 @@ fn subtract(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Optio
     if let Some(inner) = negated(graph, right) {
         return graph.add(left, inner);
     }
+    if let Some(inner) = negated(graph, left) {
+        let sum = graph.add(inner, right);
+        return graph.negate(sum);
+    }
+    if let (Some(c), Some((inner, rest))) = (b, constant_sum(graph, left)) {
+        let sum = graph.constant(inner - c);
+        return graph.add(sum, rest);
+    }
+    if let Some(difference) = cancelled(graph, left, right) {
+        return difference;
+    }
     graph.intern(Operation::Binary(Binary::Subtract, left, right))
+}
+
+/// `(x + y) - x`, `x - (x + y)`, `(x - y) - x` and `x - (x - y)`, as displacements from a reference produce them.
+fn cancelled(graph: &mut Graph, left: Node, right: Node) -> Option<Node> {
+    match (graph.operation(left), graph.operation(right)) {
+        (Operation::Binary(Binary::Add, a, b), _) if a == right => Some(b),
+        (Operation::Binary(Binary::Add, a, b), _) if b == right => Some(a),
+        (Operation::Binary(Binary::Subtract, a, b), _) if a == right => Some(graph.negate(b)),
+        (_, Operation::Binary(Binary::Add, a, b)) if a == left => Some(graph.negate(b)),
+        (_, Operation::Binary(Binary::Add, a, b)) if b == left => Some(graph.negate(a)),
+        (_, Operation::Binary(Binary::Subtract, a, b)) if a == left => Some(b),
+        _ => None,
+    }
 }
 
 fn multiply(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Option<f64>) -> Node {
@@ -108,6 +198,12 @@ fn multiply(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Optio
         }
         (None, None) => {}
     }
+    for (constant, other) in [(a, right), (b, left)] {
+        if let (Some(c), Some((inner, rest))) = (constant, constant_product(graph, other)) {
+            let product = graph.constant(c * inner);
+            return graph.multiply(product, rest);
+        }
+    }
     let (first, second) = if left <= right { (left, right) } else { (right, left) };
     graph.intern(Operation::Binary(Binary::Multiply, first, second))
 }
@@ -128,21 +224,40 @@ fn divide(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Option<
         let quotient = graph.divide(inner, right);
         return graph.negate(quotient);
     }
+    if let Some(inner) = negated(graph, right) {
+        let quotient = graph.divide(left, inner);
+        return graph.negate(quotient);
+    }
     graph.intern(Operation::Binary(Binary::Divide, left, right))
 }
+
+/// Largest whole exponent that is written out as multiplications.
+const LARGEST_WRITTEN_POWER: f64 = 8.0;
 
 fn power(graph: &mut Graph, base: Node, exponent: Node, value: Option<f64>) -> Node {
     match value {
         Some(0.0) => graph.constant(1.0),
-        Some(1.0) => base,
-        Some(2.0) => graph.multiply(base, base),
         Some(0.5) => graph.unary(Unary::Sqrt, base),
-        Some(-1.0) => {
+        Some(n) if n.fract() == 0.0 && n.abs() <= LARGEST_WRITTEN_POWER => {
+            let written = whole_power(graph, base, n.abs() as u32);
+            if n > 0.0 {
+                return written;
+            }
             let one = graph.constant(1.0);
-            graph.divide(one, base)
+            graph.divide(one, written)
         }
         _ => graph.intern(Operation::Binary(Binary::Power, base, exponent)),
     }
+}
+
+/// `base^n` for n > 0 by repeated squaring.
+fn whole_power(graph: &mut Graph, base: Node, n: u32) -> Node {
+    if n == 1 {
+        return base;
+    }
+    let half = whole_power(graph, base, n / 2);
+    let square = graph.multiply(half, half);
+    if n % 2 == 0 { square } else { graph.multiply(square, base) }
 }
 
 impl Unary {

@@ -1,8 +1,23 @@
 //! From a checked study to equations of motion.
 //!
 //! *In*: a [`crate::study::Study`]. *Out*: a [`System`] of expressions in time, states, parameters and input samples only.
-//! *Must not happen here*: numerical evaluation, parsing, knowledge of particular laws.
+//! *Must not happen here*: repeated numerical evaluation, parsing, knowledge of particular laws.
+//!
+//! A joint is a list of motion axes; every axis is one link of the spanning tree (`topology`). Motion goes outwards
+//! (`kinematics`), forces come from the elements (`forces`), accelerations from the articulated-body algorithm
+//! (`articulated`), all on symbolic scalars, so that whatever is structurally zero vanishes.
 
+mod articulated;
+mod derive;
+mod error;
+mod forces;
+mod kinematics;
+mod scale;
+mod starts;
 mod system;
+mod topology;
+mod vector;
 
+pub use derive::derive;
+pub use error::MechanicsError;
 pub use system::*;

@@ -1,1 +1,22 @@
-//! (contract follows)
+//! Equations as straight-line programs.
+//!
+//! *In*: a [`crate::mechanics::System`]. *Out*: a [`Model`]: tapes for rates, their sparse Jacobian, parameter derivatives, outputs
+//! and their derivatives, probes, start values. [`Bound`] evaluates them for one parameter vector and one set of inputs.
+//! *Must not happen here*: symbolic manipulation beyond asking the graph for derivatives, knowledge of mechanics or data.
+//!
+//! A [`Model`] is immutable and shared between threads; all memory of an evaluation is in [`Bound`]. Nodes that depend on
+//! parameters only are computed once per parameter vector, nodes of time and inputs once per time.
+
+mod bound;
+mod compile;
+mod model;
+mod program;
+
+pub use bound::{Bound, StartValues};
+pub use model::Model;
+
+/// Sampled inputs of an experiment as functions of time.
+pub trait InputSource: Sync {
+    /// The `order`-th time derivative of input channel `input` (index in the study's inputs) at time `t`, SI.
+    fn sample(&self, input: u32, order: u8, t: f64) -> f64;
+}

@@ -1,0 +1,252 @@
+//! Accelerations by the articulated-body algorithm on expressions (Featherstone-2008, table 7.1).
+
+use super::kinematics::{SpatialMotion, FrameMotion, carry, motion_axis};
+use super::topology::Tree;
+use super::vector::{self, Matrix, Vector};
+use crate::expression::{Graph, Node};
+use crate::study::{Body, Study};
+
+/// Spatial inertia about a link's origin in its axes: [[rotational, coupling], [coupling^T, translational]].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Inertia {
+    pub rotational: Matrix,
+    pub coupling: Matrix,
+    pub translational: Matrix,
+}
+
+/// Moment about a link's origin and force, in its axes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wrench {
+    pub moment: Vector,
+    pub force: Vector,
+}
+
+impl Wrench {
+    pub fn zero(graph: &mut Graph) -> Self {
+        Self { moment: vector::zero(graph), force: vector::zero(graph) }
+    }
+
+    pub fn add(self, graph: &mut Graph, other: Wrench) -> Wrench {
+        Wrench {
+            moment: vector::add(graph, self.moment, other.moment),
+            force: vector::add(graph, self.force, other.force),
+        }
+    }
+
+    pub fn subtract(self, graph: &mut Graph, other: Wrench) -> Wrench {
+        Wrench {
+            moment: vector::subtract(graph, self.moment, other.moment),
+            force: vector::subtract(graph, self.force, other.force),
+        }
+    }
+
+    pub fn scale(self, graph: &mut Graph, factor: Node) -> Wrench {
+        Wrench {
+            moment: vector::scale(graph, factor, self.moment),
+            force: vector::scale(graph, factor, self.force),
+        }
+    }
+
+    /// Power on a motion (angular, linear).
+    fn on(self, graph: &mut Graph, motion: (Vector, Vector)) -> Node {
+        let turning = vector::dot(graph, self.moment, motion.0);
+        let shifting = vector::dot(graph, self.force, motion.1);
+        graph.add(turning, shifting)
+    }
+
+    /// The same load about the predecessor's origin in its axes.
+    fn carried_back(self, graph: &mut Graph, frame: &FrameMotion) -> Wrench {
+        let force = vector::apply(graph, frame.rotation, self.force);
+        let moment = vector::apply(graph, frame.rotation, self.moment);
+        let lever = vector::cross(graph, frame.shift, force);
+        Wrench { moment: vector::add(graph, moment, lever), force }
+    }
+}
+
+impl Inertia {
+    pub fn zero(graph: &mut Graph) -> Self {
+        let zero = vector::zero_matrix(graph);
+        Self { rotational: zero, coupling: zero, translational: zero }
+    }
+
+    pub fn add(self, graph: &mut Graph, other: Inertia) -> Inertia {
+        Inertia {
+            rotational: vector::add_matrix(graph, self.rotational, other.rotational),
+            coupling: vector::add_matrix(graph, self.coupling, other.coupling),
+            translational: vector::add_matrix(graph, self.translational, other.translational),
+        }
+    }
+
+    /// `I (angular, linear)`.
+    pub fn apply(&self, graph: &mut Graph, (angular, linear): (Vector, Vector)) -> Wrench {
+        let by_rotation = vector::apply(graph, self.rotational, angular);
+        let by_shift = vector::apply(graph, self.coupling, linear);
+        let moment = vector::add(graph, by_rotation, by_shift);
+        let by_rotation = vector::apply_transposed(graph, self.coupling, angular);
+        let by_shift = vector::apply(graph, self.translational, linear);
+        Wrench { moment, force: vector::add(graph, by_rotation, by_shift) }
+    }
+
+    /// The same inertia about the predecessor's origin in its axes.
+    fn carried_back(&self, graph: &mut Graph, frame: &FrameMotion) -> Inertia {
+        let rotational = vector::turn_symmetric(graph, frame.rotation, self.rotational);
+        let coupling = vector::turn(graph, frame.rotation, self.coupling);
+        let translational = vector::turn_symmetric(graph, frame.rotation, self.translational);
+        let lever = vector::skew(graph, frame.shift);
+        let shifted = vector::multiply(graph, lever, translational);
+        let new_coupling = vector::add_matrix(graph, coupling, shifted);
+        // J + lever (H + lever M)^T - H lever, with lever^T = -lever.
+        let outer = vector::multiply(graph, lever, vector::transpose(new_coupling));
+        let inner = vector::multiply(graph, coupling, lever);
+        let change = vector::subtract_matrix(graph, outer, inner);
+        let rotational = vector::add_matrix(graph, rotational, change);
+        Inertia { rotational: vector::mirrored(rotational), coupling: new_coupling, translational }
+    }
+
+    /// `I - U U^T / D`. Where D is an element of U (an axis along a frame's axis) the removed direction vanishes
+    /// structurally, because `D / D` folds to one.
+    fn without(&self, graph: &mut Graph, along: Wrench, divisor: Node) -> Inertia {
+        let one = graph.constant(1.0);
+        let inverse = graph.divide(one, divisor);
+        let ratio = |graph: &mut Graph, v: Vector| {
+            v.map(|component| {
+                let quotient = graph.divide(component, divisor);
+                match graph.constant_value(quotient) {
+                    Some(_) => quotient,
+                    None => graph.multiply(component, inverse),
+                }
+            })
+        };
+        let scaled = Wrench { moment: ratio(graph, along.moment), force: ratio(graph, along.force) };
+        let mut reduce = |m: Matrix, left: Vector, right: Vector| -> Matrix {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    let product = graph.multiply(left[i], right[j]);
+                    graph.subtract(m[i][j], product)
+                })
+            })
+        };
+        let rotational = reduce(self.rotational, along.moment, scaled.moment);
+        let translational = reduce(self.translational, along.force, scaled.force);
+        let coupling = reduce(self.coupling, along.moment, scaled.force);
+        Inertia { rotational: vector::mirrored(rotational), coupling, translational: vector::mirrored(translational) }
+    }
+}
+
+/// Inertia of a body about `origin` (its own origin at `offset` from there), parallel axes.
+fn body_inertia(graph: &mut Graph, body: &Body, offset: Vector) -> Inertia {
+    let [xx, yy, zz, xy, xz, yz] = body.inertia;
+    let central = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    let lever = vector::add(graph, offset, body.centre_of_gravity);
+    let moment = vector::scale(graph, body.mass, lever);
+    let coupling = vector::skew(graph, moment);
+    let arm = vector::skew(graph, lever);
+    let steiner = vector::multiply(graph, coupling, arm);
+    let rotational = vector::subtract_matrix(graph, central, steiner);
+    let zero = graph.constant(0.0);
+    let translational = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { body.mass } else { zero }));
+    Inertia { rotational: vector::mirrored(rotational), coupling, translational }
+}
+
+/// Inertia of everything that moves rigidly with each link.
+pub(super) fn link_inertias(graph: &mut Graph, study: &Study, tree: &Tree) -> Vec<Inertia> {
+    tree.links
+        .iter()
+        .map(|link| {
+            let mut sum = Inertia::zero(graph);
+            for &body in &link.bodies {
+                let own = body_inertia(graph, &study.bodies[body], tree.seats[body].offset);
+                sum = sum.add(graph, own);
+            }
+            sum
+        })
+        .collect()
+}
+
+/// What the algorithm finds per link.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Accelerated {
+    /// Second derivative of the coordinate.
+    pub acceleration: Node,
+    /// S^T I^A S: what the joint has to move, the outer joints free. Zero: the acceleration is undetermined.
+    pub moved_inertia: Node,
+}
+
+/// Accelerations of all coordinates under `loads` on the coordinates and `wrenches` on the links.
+pub(super) fn articulated_bodies(
+    graph: &mut Graph,
+    tree: &Tree,
+    frames: &[FrameMotion],
+    inertias: &[Inertia],
+    loads: &[Node],
+    wrenches: &[Wrench],
+    gravity: Vector,
+) -> Vec<Accelerated> {
+    let count = tree.links.len();
+    let axes: Vec<(Vector, Vector)> = tree.links.iter().map(|link| motion_axis(graph, link.axis)).collect();
+    let mut inertia = inertias.to_vec();
+    let mut bias: Vec<Wrench> = (0..count)
+        .map(|i| {
+            let gyroscopic = velocity_load(graph, &frames[i], &inertias[i]);
+            gyroscopic.subtract(graph, wrenches[i])
+        })
+        .collect();
+    let mut along: Vec<Wrench> = Vec::new();
+    let mut moved: Vec<(Node, Node)> = Vec::new();
+    for i in (0..count).rev() {
+        let frame = &frames[i];
+        let u = inertia[i].apply(graph, axes[i]);
+        let divisor = u.on(graph, axes[i]);
+        let resisting = bias[i].on(graph, axes[i]);
+        let driving = graph.subtract(loads[i], resisting);
+        along.push(u);
+        moved.push((divisor, driving));
+        if let Some(p) = tree.links[i].predecessor {
+            let reduced = inertia[i].without(graph, u, divisor);
+            let by_bias = reduced.apply(graph, (frame.angular_bias, frame.bias));
+            let quotient = graph.divide(driving, divisor);
+            let by_drive = u.scale(graph, quotient);
+            let total = bias[i].add(graph, by_bias).add(graph, by_drive).carried_back(graph, frame);
+            let carried = reduced.carried_back(graph, frame);
+            inertia[p] = inertia[p].add(graph, carried);
+            bias[p] = bias[p].add(graph, total);
+        }
+    }
+    along.reverse();
+    moved.reverse();
+
+    let base = SpatialMotion { angular: vector::zero(graph), linear: vector::negate(graph, gravity) };
+    let mut result: Vec<Accelerated> = Vec::with_capacity(count);
+    let mut spatial: Vec<SpatialMotion> = Vec::with_capacity(count);
+    for i in 0..count {
+        let frame = &frames[i];
+        let before = tree.links[i].predecessor.map_or(base, |p| spatial[p]);
+        let (angular, linear) = carry(graph, frame.rotation, frame.shift, before);
+        let angular = vector::add(graph, angular, frame.angular_bias);
+        let linear = vector::add(graph, linear, frame.bias);
+        let (divisor, driving) = moved[i];
+        let carried = along[i].on(graph, (angular, linear));
+        let rest = graph.subtract(driving, carried);
+        let acceleration = graph.divide(rest, divisor);
+        let (turning, shifting) = axes[i];
+        let turning = vector::scale(graph, acceleration, turning);
+        let shifting = vector::scale(graph, acceleration, shifting);
+        spatial.push(SpatialMotion {
+            angular: vector::add(graph, angular, turning),
+            linear: vector::add(graph, linear, shifting),
+        });
+        result.push(Accelerated { acceleration, moved_inertia: divisor });
+    }
+    result
+}
+
+/// v x* (I v): centrifugal and gyroscopic load.
+fn velocity_load(graph: &mut Graph, frame: &FrameMotion, inertia: &Inertia) -> Wrench {
+    let momentum = inertia.apply(graph, (frame.angular_velocity, frame.velocity));
+    let turned = vector::cross(graph, frame.angular_velocity, momentum.moment);
+    let dragged = vector::cross(graph, frame.velocity, momentum.force);
+    Wrench {
+        moment: vector::add(graph, turned, dragged),
+        force: vector::cross(graph, frame.angular_velocity, momentum.force),
+    }
+}

@@ -1,0 +1,1 @@
+//! Stable text of a study's mechanics.

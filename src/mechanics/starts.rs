@@ -1,0 +1,69 @@
+//! How every experiment starts.
+
+use super::error::{MechanicsError, UNKNOWN_START};
+use super::system::{StartEquation, Variable, VariableKind};
+use crate::expression::{Graph, Node, Symbol};
+use crate::study::{Experiment, StartBase};
+use std::collections::HashMap;
+
+/// Start of every state of one experiment, free of other states.
+///
+/// `initial` holds the law states' declared start values with kinematic symbols already replaced.
+pub(super) fn starts(
+    graph: &mut Graph,
+    states: &[Variable],
+    experiment: &Experiment,
+    initial: &HashMap<Symbol, Node>,
+    overrides: &[(Symbol, Node)],
+) -> Result<Vec<StartEquation>, Vec<MechanicsError>> {
+    let zero = graph.constant(0.0);
+    let given: Vec<Option<Node>> = states
+        .iter()
+        .map(|state| {
+            let stated = overrides.iter().rev().find(|(symbol, _)| *symbol == state.symbol).map(|&(_, node)| node);
+            stated.or(match (experiment.start.base, state.kind) {
+                (StartBase::Equilibrium, _) => None,
+                (StartBase::Rest, VariableKind::Law) => Some(initial.get(&state.symbol).copied().unwrap_or(zero)),
+                (StartBase::Rest, _) => Some(zero),
+            })
+        })
+        .collect();
+    let resolved = resolve(graph, states, given);
+    let mut errors = Vec::new();
+    for (state, value) in states.iter().zip(&resolved) {
+        let Some(value) = value else { continue };
+        let unknown = graph.symbols_of(&[*value]);
+        if let Some(other) = states.iter().find(|other| unknown.contains(&other.symbol)) {
+            errors.push(MechanicsError {
+                code: UNKNOWN_START,
+                message: format!(
+                    "the start value of `{}` in experiment `{}` depends on `{}`, which is not known at the start",
+                    state.name, experiment.name, other.name
+                ),
+                labels: vec![(experiment.span, "started here".into())],
+                help: format!("give `{}` a start value by parameters and numbers only", state.name),
+            });
+        }
+    }
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    Ok(resolved.into_iter().map(|value| value.map_or(StartEquation::Equilibrium, StartEquation::Value)).collect())
+}
+
+/// Replaces states in start values by their own start values, as often as that changes anything: at most once per
+/// state unless the values go in a circle.
+fn resolve(graph: &mut Graph, states: &[Variable], mut given: Vec<Option<Node>>) -> Vec<Option<Node>> {
+    for _ in 0..=states.len() {
+        let known: HashMap<Symbol, Node> =
+            states.iter().zip(&given).filter_map(|(state, value)| Some((state.symbol, (*value)?))).collect();
+        let roots: Vec<Node> = given.iter().flatten().copied().collect();
+        let new = graph.substitute(&roots, &known);
+        if new == roots {
+            break;
+        }
+        let mut new = new.into_iter();
+        given = given.into_iter().map(|value| value.and_then(|_| new.next())).collect();
+    }
+    given
+}

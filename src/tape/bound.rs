@@ -1,0 +1,224 @@
+//! Evaluation of a model for one parameter vector and one set of inputs.
+
+use super::model::{Element, Model};
+use super::InputSource;
+use crate::integrate::Dynamics;
+use crate::linear::SparsityPattern;
+
+/// A model with parameters and inputs bound, and the memory of its evaluation.
+///
+/// `n` variables (states, then algebraic ones), `p` parameters, `m` outputs; all matrices column-major, all values SI.
+pub struct Bound<'a> {
+    model: &'a Model,
+    inputs: &'a dyn InputSource,
+    registers: Vec<f64>,
+    /// Whether the registers hold the rates at the time and variables that stand in them.
+    is_current: bool,
+}
+
+/// Start values as far as they are given; see [`Bound::start_values`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct StartValues {
+    /// Length n; zero where equilibrium (or consistency) determines the value.
+    pub values: Vec<f64>,
+    /// d(values)/d(parameters), n x p column-major.
+    pub derivatives: Vec<f64>,
+    /// Length n: true where the value follows from equilibrium; algebraic variables included.
+    pub equilibrium: Vec<bool>,
+}
+
+impl<'a> Bound<'a> {
+    /// `theta`: parameter values (SI) in the order of [`Model::parameter_names`]; missing ones are NaN.
+    pub fn new(model: &'a Model, inputs: &'a dyn InputSource, theta: &[f64]) -> Self {
+        let mut bound = Self { model, inputs, registers: model.registers.clone(), is_current: false };
+        bound.set_parameters(theta);
+        bound
+    }
+
+    /// Replaces the parameter values.
+    pub fn set_parameters(&mut self, theta: &[f64]) {
+        let first = self.model.layout.parameters;
+        for i in 0..self.model.parameter_count() {
+            self.registers[first + i] = theta.get(i).copied().unwrap_or(f64::NAN);
+        }
+        self.model.prologue.execute(&mut self.registers, self.inputs);
+        self.is_current = false;
+    }
+
+    pub fn model(&self) -> &'a Model {
+        self.model
+    }
+
+    /// The parameter values (SI).
+    pub fn parameters(&self) -> &[f64] {
+        let first = self.model.layout.parameters;
+        &self.registers[first..first + self.model.parameter_count()]
+    }
+
+    /// Rates and constraints at (t, y) into their registers, unless they are there.
+    fn update(&mut self, t: f64, y: &[f64]) {
+        let layout = self.model.layout;
+        let same_time = self.is_current && self.registers[layout.time].to_bits() == t.to_bits();
+        if !same_time {
+            self.registers[layout.time] = t;
+            self.model.forcing.execute(&mut self.registers, self.inputs);
+        }
+        let variables = &mut self.registers[layout.variables..layout.variables + self.model.variables.len()];
+        let same_variables = variables.iter().zip(y).all(|(a, b)| a.to_bits() == b.to_bits());
+        if !(same_time && same_variables) {
+            variables.copy_from_slice(y);
+            self.model.rates.execute(&mut self.registers, self.inputs);
+        }
+        self.is_current = true;
+    }
+
+    /// The measured channels, length m.
+    pub fn outputs(&mut self, t: f64, y: &[f64], out: &mut [f64]) {
+        self.update(t, y);
+        self.model.outputs.execute(&mut self.registers, self.inputs);
+        self.gather(&self.model.output_registers, out);
+    }
+
+    /// d(outputs)/d(theta) along a solution with sensitivity dy/dtheta (n x p): m x p into `out`.
+    pub fn output_sensitivity(&mut self, t: f64, y: &[f64], sensitivity_y: &[f64], out: &mut [f64]) {
+        self.evaluate_output_derivatives(t, y);
+        let (n, m) = (self.model.dimension(), self.model.output_count());
+        out.fill(0.0);
+        self.scatter(&self.model.output_by_parameter.elements, 1.0, out);
+        if m == 0 || n == 0 {
+            return;
+        }
+        for (of_output, of_state) in out.chunks_exact_mut(m).zip(sensitivity_y.chunks_exact(n)) {
+            for element in &self.model.output_by_state.elements {
+                let slope = self.registers[element.register as usize];
+                of_output[element.row as usize] += slope * of_state[element.column as usize];
+            }
+        }
+    }
+
+    /// d(outputs)/d(y), m x n, and d(outputs)/d(theta) at fixed y, m x p.
+    pub fn output_derivatives(&mut self, t: f64, y: &[f64], by_state: &mut [f64], by_parameter: &mut [f64]) {
+        self.evaluate_output_derivatives(t, y);
+        by_state.fill(0.0);
+        self.scatter(&self.model.output_by_state.elements, 1.0, by_state);
+        by_parameter.fill(0.0);
+        self.scatter(&self.model.output_by_parameter.elements, 1.0, by_parameter);
+    }
+
+    fn evaluate_output_derivatives(&mut self, t: f64, y: &[f64]) {
+        self.update(t, y);
+        self.model.outputs.execute(&mut self.registers, self.inputs);
+        self.model.output_by_state.program.execute(&mut self.registers, self.inputs);
+    }
+
+    /// The probes of the system, in its order.
+    pub fn probes(&mut self, t: f64, y: &[f64], out: &mut [f64]) {
+        self.update(t, y);
+        self.model.probes.execute(&mut self.registers, self.inputs);
+        self.gather(&self.model.probe_registers, out);
+    }
+
+    /// Given start values of experiment `experiment` at its first time. An experiment that the system does not have is
+    /// answered as equilibrium throughout.
+    pub fn start_values(&mut self, experiment: usize, t0: f64) -> StartValues {
+        let (n, p) = (self.model.dimension(), self.model.parameter_count());
+        let mut start =
+            StartValues { values: vec![0.0; n], derivatives: vec![0.0; n * p], equilibrium: vec![true; n] };
+        let Some(program) = self.model.starts.get(experiment) else { return start };
+        self.is_current = false;
+        self.registers[self.model.layout.time] = t0;
+        program.program.execute(&mut self.registers, self.inputs);
+        for (state, register) in program.values.iter().enumerate() {
+            if let Some(register) = register {
+                start.values[state] = self.registers[*register as usize];
+                start.equilibrium[state] = false;
+            }
+        }
+        for element in &program.elements {
+            start.derivatives[element.column as usize * n + element.row as usize] =
+                self.registers[element.register as usize];
+        }
+        start
+    }
+
+    fn gather(&self, from: &[u32], out: &mut [f64]) {
+        for (value, &register) in out.iter_mut().zip(from) {
+            *value = self.registers[register as usize];
+        }
+    }
+
+    fn scatter(&self, elements: &[Element], sign: f64, out: &mut [f64]) {
+        for element in elements {
+            out[element.slot as usize] = sign * self.registers[element.register as usize];
+        }
+    }
+
+    /// As [`Bound::scatter`]; rows of states get the sign of F = y' - rates, constraints stay as they are.
+    fn scatter_residual(&self, elements: &[Element], out: &mut [f64]) {
+        for element in elements {
+            let value = self.registers[element.register as usize];
+            let is_state = (element.row as usize) < self.model.state_count;
+            out[element.slot as usize] = if is_state { -value } else { value };
+        }
+    }
+}
+
+impl Dynamics for Bound<'_> {
+    fn dimension(&self) -> usize {
+        self.model.dimension()
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.model.parameter_count()
+    }
+
+    fn differential(&self) -> &[bool] {
+        &self.model.differential
+    }
+
+    fn scale(&self) -> &[f64] {
+        &self.model.scale
+    }
+
+    fn residual(&mut self, t: f64, y: &[f64], y_prime: &[f64], residual: &mut [f64]) {
+        self.update(t, y);
+        self.gather(&self.model.rate_registers, residual);
+        for (value, derivative) in residual.iter_mut().zip(y_prime).take(self.model.state_count) {
+            *value = derivative - *value;
+        }
+    }
+
+    fn pattern(&self) -> &SparsityPattern {
+        &self.model.pattern
+    }
+
+    fn jacobian(&mut self, t: f64, y: &[f64], _y_prime: &[f64], c: f64, values: &mut [f64]) {
+        self.update(t, y);
+        self.model.jacobian.program.execute(&mut self.registers, self.inputs);
+        values.fill(0.0);
+        self.scatter_residual(&self.model.jacobian.elements, values);
+        for &slot in &self.model.diagonal {
+            values[slot as usize] += c;
+        }
+    }
+
+    fn parameter_derivative(&mut self, t: f64, y: &[f64], _y_prime: &[f64], values: &mut [f64]) {
+        self.update(t, y);
+        self.model.parameter_derivative.program.execute(&mut self.registers, self.inputs);
+        values.fill(0.0);
+        self.scatter_residual(&self.model.parameter_derivative.elements, values);
+    }
+
+    fn explicit_rates(&mut self, t: f64, y: &[f64], rates: &mut [f64]) -> bool {
+        if self.model.state_count < self.model.dimension() {
+            return false;
+        }
+        self.update(t, y);
+        self.gather(&self.model.rate_registers, rates);
+        true
+    }
+
+    fn component_name(&self, i: usize) -> String {
+        self.model.variables.get(i).map_or_else(|| format!("y[{i}]"), |variable| variable.name.clone())
+    }
+}

@@ -1,0 +1,339 @@
+//! From equations to programs.
+
+use super::model::{Derivative, Element, Layout, Model, StartProgram};
+use super::program::{Instruction, Program};
+use crate::expression::{Entry, Graph, Node, Operation, Symbol};
+use crate::linear::SparsityPattern;
+use crate::mechanics::{StartEquation, System, Variable};
+use std::collections::BTreeMap;
+use std::collections::HashMap;
+
+impl Model {
+    /// Compiles a system. Symbols that are neither time, variable nor parameter evaluate to NaN.
+    pub fn compile(system: &System) -> Model {
+        let variables: Vec<Variable> = system.states.iter().chain(&system.algebraic).cloned().collect();
+        let (n, state_count, p) = (variables.len(), system.states.len(), system.parameters.len());
+        let mut roots = Roots::of(system);
+        let unknowns: Vec<Symbol> = variables.iter().map(|variable| variable.symbol).collect();
+        let jacobian = roots.graph.jacobian(&roots.rates, &unknowns);
+        let parameter_derivative = roots.graph.jacobian(&roots.rates, &system.parameters);
+        let output_by_state = roots.graph.jacobian(&roots.outputs, &unknowns);
+        let output_by_parameter = roots.graph.jacobian(&roots.outputs, &system.parameters);
+        let start_derivatives: Vec<Vec<Entry>> =
+            roots.starts.iter().map(|values| roots.graph.jacobian(values, &system.parameters)).collect();
+
+        let nodes_of = |entries: &[Entry]| entries.iter().map(|entry| entry.value).collect::<Vec<_>>();
+        let output_derivatives: Vec<Node> = [nodes_of(&output_by_state), nodes_of(&output_by_parameter)].concat();
+        let mut everything = [&roots.rates[..], &roots.outputs, &roots.probes, &output_derivatives].concat();
+        everything.extend(nodes_of(&jacobian));
+        everything.extend(nodes_of(&parameter_derivative));
+        everything.extend(roots.starts.iter().flatten());
+        everything.extend(start_derivatives.iter().flat_map(|entries| nodes_of(entries)));
+
+        let mut assembler = Assembler::new(&roots.graph, system, &unknowns, &everything);
+        let prologue = assembler.program(&everything, Dependence::Parameters);
+        let after_prologue = assembler.registers.clone();
+        let forcing = assembler.program(&roots.rates, Dependence::Time);
+        let rates = assembler.program(&roots.rates, Dependence::State);
+        let rate_registers = assembler.registers_of(&roots.rates);
+        let after_rates = assembler.registers.clone();
+
+        let jacobian_program = assembler.program(&nodes_of(&jacobian), Dependence::State);
+        let (pattern, diagonal) = iteration_pattern(n, state_count, &jacobian);
+        let in_pattern = |entry: &Entry| slot_in(&pattern, entry.row, entry.column);
+        let jacobian = assembler.derivative(jacobian_program, &jacobian, in_pattern);
+
+        assembler.registers.clone_from(&after_rates);
+        let program = assembler.program(&nodes_of(&parameter_derivative), Dependence::State);
+        let dense = |rows: usize| move |entry: &Entry| entry.column * rows + entry.row;
+        let parameter_derivative = assembler.derivative(program, &parameter_derivative, dense(n));
+
+        assembler.registers.clone_from(&after_rates);
+        let outputs = assembler.program(&roots.outputs, Dependence::State);
+        let output_registers = assembler.registers_of(&roots.outputs);
+        let m = roots.outputs.len();
+        let program = assembler.program(&output_derivatives, Dependence::State);
+        let output_by_state = assembler.derivative(program, &output_by_state, dense(m));
+        let output_by_parameter = assembler.derivative(Program::default(), &output_by_parameter, dense(m));
+
+        assembler.registers.clone_from(&after_rates);
+        let probes = assembler.program(&roots.probes, Dependence::State);
+        let probe_registers = assembler.registers_of(&roots.probes);
+
+        let starts = (system.starts.iter().zip(&roots.starts).zip(&start_derivatives))
+            .map(|((equations, values), entries)| {
+                assembler.registers.clone_from(&after_prologue);
+                assembler.start(equations, values, entries, state_count)
+            })
+            .collect();
+
+        let mut registers = assembler.constants;
+        registers.resize(assembler.next, 0.0);
+        debug_assert_eq!(p, system.parameter_names.len());
+        Model {
+            state_count,
+            parameter_names: system.parameter_names.clone(),
+            output_names: system.outputs.iter().map(|output| output.name.clone()).collect(),
+            probe_names: system.probes.iter().map(|probe| probe.name.clone()).collect(),
+            differential: (0..n).map(|i| i < state_count).collect(),
+            scale: variables.iter().map(|variable| variable.scale).collect(),
+            variables,
+            registers,
+            layout: assembler.layout,
+            prologue,
+            forcing,
+            rates,
+            rate_registers,
+            jacobian,
+            pattern,
+            diagonal,
+            parameter_derivative,
+            outputs,
+            output_registers,
+            output_by_state,
+            output_by_parameter,
+            probes,
+            probe_registers,
+            starts,
+        }
+    }
+}
+
+/// The expressions to compile, in a graph with nothing else.
+struct Roots {
+    graph: Graph,
+    /// Rates, then constraints.
+    rates: Vec<Node>,
+    outputs: Vec<Node>,
+    probes: Vec<Node>,
+    /// Per experiment: the given start values, in state order.
+    starts: Vec<Vec<Node>>,
+}
+
+impl Roots {
+    fn of(system: &System) -> Self {
+        let rates = system.rates.iter().chain(&system.constraints).copied();
+        let values = |outputs: &[crate::mechanics::Output]| outputs.iter().map(|o| o.value).collect::<Vec<_>>();
+        let given = |equations: &Vec<StartEquation>| {
+            let value = |equation: &StartEquation| match equation {
+                StartEquation::Value(node) => Some(*node),
+                StartEquation::Equilibrium => None,
+            };
+            equations.iter().filter_map(value).collect::<Vec<_>>()
+        };
+        let mut groups = vec![rates.collect::<Vec<_>>(), values(&system.outputs), values(&system.probes)];
+        groups.extend(system.starts.iter().map(given));
+        let (graph, nodes) = system.graph.extract(&groups.concat());
+        let mut rest = nodes.into_iter();
+        let mut groups = groups.iter().map(|group| rest.by_ref().take(group.len()).collect::<Vec<_>>());
+        let mut next = || groups.next().unwrap_or_default();
+        let (rates, outputs, probes) = (next(), next(), next());
+        let starts = groups.collect();
+        Self { graph, rates, outputs, probes, starts }
+    }
+}
+
+/// What a node's value depends on at most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Dependence {
+    Parameters,
+    Time,
+    State,
+}
+
+const UNASSIGNED: u32 = u32::MAX;
+
+/// Assigns registers to nodes while programs are written.
+struct Assembler<'a> {
+    graph: &'a Graph,
+    dependence: Vec<Dependence>,
+    /// Register per node of the graph, `UNASSIGNED` where not computed yet.
+    registers: Vec<u32>,
+    next: usize,
+    layout: Layout,
+    /// Initial content of the first registers.
+    constants: Vec<f64>,
+}
+
+impl<'a> Assembler<'a> {
+    /// Places constants, parameters, time and variables in the first registers.
+    fn new(graph: &'a Graph, system: &System, unknowns: &[Symbol], everything: &[Node]) -> Self {
+        let p = system.parameters.len();
+        let layout = Layout { parameters: 0, time: p, variables: p + 1 };
+        let mut place: HashMap<Symbol, (usize, Dependence)> = HashMap::new();
+        place.extend(system.parameters.iter().enumerate().map(|(i, &s)| (s, (i, Dependence::Parameters))));
+        place.insert(system.time, (layout.time, Dependence::Time));
+        place.extend(unknowns.iter().enumerate().map(|(i, &s)| (s, (layout.variables + i, Dependence::State))));
+        let mut assembler = Self {
+            graph,
+            dependence: vec![Dependence::Parameters; graph.len()],
+            registers: vec![UNASSIGNED; graph.len()],
+            next: 0,
+            layout,
+            constants: vec![0.0; layout.variables + unknowns.len()],
+        };
+        for node in graph.reachable(everything) {
+            let (register, dependence) = match graph.operation(node) {
+                Operation::Constant(bits) => assembler.constant(f64::from_bits(bits)),
+                Operation::Symbol(symbol) => match place.get(&symbol) {
+                    Some(&(register, dependence)) => (register as u32, dependence),
+                    None => assembler.constant(f64::NAN),
+                },
+                operation => {
+                    let children = operation.children().map(|child| assembler.dependence[child.index()]);
+                    let own = if matches!(operation, Operation::Sample { .. }) {
+                        Dependence::Time
+                    } else {
+                        Dependence::Parameters
+                    };
+                    (UNASSIGNED, children.fold(own, Dependence::max))
+                }
+            };
+            assembler.registers[node.index()] = register;
+            assembler.dependence[node.index()] = dependence;
+        }
+        assembler.next = assembler.constants.len();
+        assembler
+    }
+
+    fn constant(&mut self, value: f64) -> (u32, Dependence) {
+        self.constants.push(value);
+        (self.constants.len() as u32 - 1, Dependence::Parameters)
+    }
+
+    fn registers_of(&self, nodes: &[Node]) -> Vec<u32> {
+        nodes.iter().map(|node| self.registers[node.index()]).collect()
+    }
+
+    /// A program for what `roots` need, as far as it depends on at most `limit` and is not computed yet.
+    fn program(&mut self, roots: &[Node], limit: Dependence) -> Program {
+        let missing: Vec<Node> = self
+            .graph
+            .reachable(roots)
+            .into_iter()
+            .filter(|node| self.registers[node.index()] == UNASSIGNED && self.dependence[node.index()] <= limit)
+            .collect();
+        let mut program = Program::default();
+        for node in self.schedule(&missing) {
+            let operation = self.graph.operation(node);
+            let operands: Vec<u32> = operation.children().map(|child| self.registers[child.index()]).collect();
+            let Some(instruction) = instruction(operation) else { continue };
+            program.push(instruction, self.next, &operands);
+            self.registers[node.index()] = self.next as u32;
+            self.next += 1;
+        }
+        program
+    }
+
+    /// Orders nodes so that equal instructions follow each other: always the instruction with most nodes ready.
+    fn schedule(&self, nodes: &[Node]) -> Vec<Node> {
+        let position: HashMap<Node, usize> = nodes.iter().enumerate().map(|(i, &node)| (node, i)).collect();
+        let mut waiting = vec![0_usize; nodes.len()];
+        let mut readers: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
+        let mut ready: BTreeMap<Instruction, Vec<usize>> = BTreeMap::new();
+        for (i, &node) in nodes.iter().enumerate() {
+            let operation = self.graph.operation(node);
+            for child in operation.children() {
+                if let Some(&child) = position.get(&child) {
+                    waiting[i] += 1;
+                    readers[child].push(i);
+                }
+            }
+            if waiting[i] == 0 && let Some(instruction) = instruction(operation) {
+                ready.entry(instruction).or_default().push(i);
+            }
+        }
+        let mut order = Vec::with_capacity(nodes.len());
+        while let Some(instruction_now) = most_ready(&ready) {
+            let mut queue = ready.remove(&instruction_now).unwrap_or_default();
+            let mut head = 0;
+            while head < queue.len() {
+                let i = queue[head];
+                head += 1;
+                order.push(nodes[i]);
+                for &reader in &readers[i] {
+                    waiting[reader] -= 1;
+                    if waiting[reader] > 0 {
+                        continue;
+                    }
+                    match instruction(self.graph.operation(nodes[reader])) {
+                        Some(next) if next == instruction_now => queue.push(reader),
+                        Some(next) => ready.entry(next).or_default().push(reader),
+                        None => {}
+                    }
+                }
+            }
+        }
+        order
+    }
+
+    fn derivative(&self, program: Program, entries: &[Entry], slot: impl Fn(&Entry) -> usize) -> Derivative {
+        let elements = entries
+            .iter()
+            .map(|entry| Element {
+                row: entry.row as u32,
+                column: entry.column as u32,
+                register: self.registers[entry.value.index()],
+                slot: slot(entry) as u32,
+            })
+            .collect();
+        Derivative { program, elements }
+    }
+
+    fn start(
+        &mut self,
+        equations: &[StartEquation],
+        values: &[Node],
+        entries: &[Entry],
+        state_count: usize,
+    ) -> StartProgram {
+        let mut needed = values.to_vec();
+        needed.extend(entries.iter().map(|entry| entry.value));
+        let program = self.program(&needed, Dependence::Time);
+        let mut given = values.iter().enumerate();
+        let mut state_of_value = Vec::new();
+        let mut registers = vec![None; state_count];
+        for (state, equation) in equations.iter().enumerate() {
+            if matches!(equation, StartEquation::Value(_)) && let Some((_, value)) = given.next() {
+                registers[state] = Some(self.registers[value.index()]);
+                state_of_value.push(state);
+            }
+        }
+        let in_states: Vec<Entry> =
+            entries.iter().map(|entry| Entry { row: state_of_value[entry.row], ..*entry }).collect();
+        let derivative =
+            self.derivative(Program::default(), &in_states, |entry| entry.column * state_count + entry.row);
+        StartProgram { program, values: registers, elements: derivative.elements }
+    }
+}
+
+fn most_ready(ready: &BTreeMap<Instruction, Vec<usize>>) -> Option<Instruction> {
+    // The last of equals wins in `max_by_key`; reversed, ties go to the first instruction.
+    ready.iter().rev().max_by_key(|(_, nodes)| nodes.len()).map(|(&instruction, _)| instruction)
+}
+
+fn instruction(operation: Operation) -> Option<Instruction> {
+    match operation {
+        Operation::Constant(_) | Operation::Symbol(_) => None,
+        Operation::Unary(function, _) => Some(Instruction::Unary(function)),
+        Operation::Binary(function, _, _) => Some(Instruction::Binary(function)),
+        Operation::Select { .. } => Some(Instruction::Select),
+        Operation::Sample { input, order, .. } => Some(Instruction::Sample { input, order }),
+    }
+}
+
+/// Pattern of the iteration matrix and the slots of the differential variables' diagonal.
+fn iteration_pattern(n: usize, state_count: usize, jacobian: &[Entry]) -> (SparsityPattern, Vec<u32>) {
+    let mut places: Vec<(usize, usize)> = jacobian.iter().map(|entry| (entry.row, entry.column)).collect();
+    places.extend((0..state_count).map(|i| (i, i)));
+    let pattern = SparsityPattern::from_entries(n, n, &places);
+    let diagonal = (0..state_count).map(|i| slot_in(&pattern, i, i) as u32).collect();
+    (pattern, diagonal)
+}
+
+/// Index of an element that the pattern contains.
+fn slot_in(pattern: &SparsityPattern, row: usize, column: usize) -> usize {
+    let start = pattern.starts[column];
+    let rows = &pattern.rows[start..pattern.starts[column + 1]];
+    start + rows.partition_point(|&other| other < row)
+}

@@ -1,0 +1,161 @@
+//! The compiled model.
+
+use super::program::Program;
+use crate::linear::SparsityPattern;
+use crate::mechanics::Variable;
+
+/// A compiled [`crate::mechanics::System`]: n variables (states, then algebraic ones), p parameters, m outputs.
+///
+/// Immutable; evaluate through [`super::Bound`].
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// States, then algebraic variables.
+    pub(super) variables: Vec<Variable>,
+    pub(super) state_count: usize,
+    pub(super) parameter_names: Vec<String>,
+    pub(super) output_names: Vec<String>,
+    pub(super) probe_names: Vec<String>,
+    pub(super) differential: Vec<bool>,
+    pub(super) scale: Vec<f64>,
+    /// Registers before the first evaluation: constants in place, all else zero.
+    pub(super) registers: Vec<f64>,
+    pub(super) layout: Layout,
+    /// Of parameters only.
+    pub(super) prologue: Program,
+    /// Of time, inputs and parameters.
+    pub(super) forcing: Program,
+    pub(super) rates: Program,
+    /// Registers of rates, then constraints. Length n.
+    pub(super) rate_registers: Vec<u32>,
+    pub(super) jacobian: Derivative,
+    pub(super) pattern: SparsityPattern,
+    /// Slots of the diagonal of differential variables in the pattern.
+    pub(super) diagonal: Vec<u32>,
+    pub(super) parameter_derivative: Derivative,
+    /// Runs after `rates`.
+    pub(super) outputs: Program,
+    pub(super) output_registers: Vec<u32>,
+    /// Runs after `outputs`: d(outputs)/d(variables) and d(outputs)/d(parameters), which share the program of the
+    /// first.
+    pub(super) output_by_state: Derivative,
+    pub(super) output_by_parameter: Derivative,
+    pub(super) probes: Program,
+    pub(super) probe_registers: Vec<u32>,
+    pub(super) starts: Vec<StartProgram>,
+}
+
+/// Places of the free variables in the register file.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Layout {
+    pub parameters: usize,
+    pub time: usize,
+    pub variables: usize,
+}
+
+/// Structurally non-zero elements of a matrix and the program that computes them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Derivative {
+    pub program: Program,
+    pub elements: Vec<Element>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Element {
+    pub row: u32,
+    pub column: u32,
+    pub register: u32,
+    /// Index into the values of the matrix this element is written to.
+    pub slot: u32,
+}
+
+/// Start values of one experiment.
+#[derive(Clone, Debug)]
+pub(super) struct StartProgram {
+    /// Runs after the prologue, with only the time set.
+    pub program: Program,
+    /// Per state: register of the value, `None` where equilibrium determines it.
+    pub values: Vec<Option<u32>>,
+    /// d(values)/d(parameters).
+    pub elements: Vec<Element>,
+}
+
+impl Model {
+    /// Number n of variables: states, then algebraic ones.
+    pub fn dimension(&self) -> usize {
+        self.variables.len()
+    }
+
+    /// Number of states, the first of the variables.
+    pub fn state_count(&self) -> usize {
+        self.state_count
+    }
+
+    pub fn parameter_count(&self) -> usize {
+        self.parameter_names.len()
+    }
+
+    pub fn output_count(&self) -> usize {
+        self.output_names.len()
+    }
+
+    pub fn probe_count(&self) -> usize {
+        self.probe_names.len()
+    }
+
+    /// States, then algebraic variables.
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    pub fn parameter_names(&self) -> &[String] {
+        &self.parameter_names
+    }
+
+    pub fn output_names(&self) -> &[String] {
+        &self.output_names
+    }
+
+    pub fn probe_names(&self) -> &[String] {
+        &self.probe_names
+    }
+
+    /// True per output where a parameter occurs in its formula or in the rates of a state it (indirectly) depends on:
+    /// p x m reach, row per parameter.
+    pub fn parameter_reach(&self) -> Vec<Vec<bool>> {
+        let (n, p, m) = (self.dimension(), self.parameter_count(), self.output_count());
+        let mut influences = vec![vec![false; m]; n];
+        for element in &self.output_by_state.elements {
+            influences[element.column as usize][element.row as usize] = true;
+        }
+        // Influence travels from a variable to all whose equation contains it; n rounds reach everything.
+        for _ in 0..n {
+            for element in &self.jacobian.elements {
+                let (row, column) = (element.row as usize, element.column as usize);
+                for output in 0..m {
+                    influences[column][output] |= influences[row][output];
+                }
+            }
+        }
+        let mut reach = vec![vec![false; m]; p];
+        for element in &self.output_by_parameter.elements {
+            reach[element.column as usize][element.row as usize] = true;
+        }
+        for element in &self.parameter_derivative.elements {
+            for output in 0..m {
+                reach[element.column as usize][output] |= influences[element.row as usize][output];
+            }
+        }
+        for element in self.starts.iter().flat_map(|start| &start.elements) {
+            for output in 0..m {
+                reach[element.column as usize][output] |= influences[element.row as usize][output];
+            }
+        }
+        reach
+    }
+
+    /// Instructions per evaluation of rates, Jacobian, parameter derivatives, outputs.
+    pub fn instruction_counts(&self) -> [usize; 4] {
+        [&self.rates, &self.jacobian.program, &self.parameter_derivative.program, &self.outputs]
+            .map(Program::instruction_count)
+    }
+}
