@@ -100,6 +100,35 @@ codes! {
 
     // ---- E03xx: mechanics ----
 
+    UNCONNECTED_BODY "E0301" "body is not connected to ground"
+    "Every body needs a chain of joints that leads to `ground`; otherwise its motion has no coordinates. A body that may move\n\
+     along one axis only needs `joint guide: prismatic(z) ground -> body`.\n"
+
+    CLOSED_LOOP "E0302" "joints close a loop"
+    "The joint connects two bodies that other joints connect already. Joints must form a tree.\n"
+
+    NO_INERTIA "E0303" "joint moves no inertia"
+    "The acceleration of a coordinate is its load divided by the inertia that moves with it. A joint whose outer bodies have no\n\
+     mass (prismatic) or no moment of inertia about its axis (revolute) has no determined acceleration.\n"
+
+    COINCIDENT_POINTS "E0304" "force element without direction"
+    "A force element between two points acts along the line that joins them. Points that coincide in the reference configuration\n\
+     have no such line: name a direction with `along z`, or choose points that are apart.\n"
+
+    ACCELERATION_IN_LOAD "E0305" "load depends on an acceleration"
+    "Accelerations follow from the loads, so that a load may not depend on one directly. What is accelerated is mass or inertia\n\
+     of a body; a controller that feeds back a measured acceleration sees it through a sensor, a law with a state.\n"
+
+    UNKNOWN_START "E0306" "start value is not determined"
+    "A start value may depend on parameters, inputs, and states whose own start value is given; not on itself, and not on a state\n\
+     that follows from equilibrium.\n"
+
+    UNKNOWN_QUANTITY "E0307" "quantity that nothing defines"
+    "An expression mentions a quantity that is neither the time, a state, a parameter, nor the motion of an element of the study.\n"
+
+    FORCE_ON_FIXED_JOINT "E0308" "force on a joint that cannot move"
+    "A force element on a joint acts along or about the joint's axis. A fixed joint has none.\n"
+
     // ---- E04xx: data files and signals ----
 
     DATA_FILE_UNREADABLE "E0401" "data file cannot be read"

@@ -33,9 +33,7 @@ impl Graph {
             derivative.fill(zero);
             self.sweep(&order, symbol, zero, &mut derivative);
             let values = roots.iter().map(|root| derivative[root.index()]).enumerate();
-            entries.extend(
-                values.filter(|&(_, value)| value != zero).map(|(row, value)| Entry { row, column, value }),
-            );
+            entries.extend(values.filter(|&(_, value)| value != zero).map(|(row, value)| Entry { row, column, value }));
         }
         entries
     }

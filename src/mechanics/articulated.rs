@@ -1,6 +1,6 @@
 //! Accelerations by the articulated-body algorithm on expressions (Featherstone-2008, table 7.1).
 
-use super::kinematics::{SpatialMotion, FrameMotion, carry, motion_axis};
+use super::kinematics::{FrameMotion, SpatialMotion, carry, motion_axis};
 use super::topology::Tree;
 use super::vector::{self, Matrix, Vector};
 use crate::expression::{Graph, Node};
@@ -41,10 +41,7 @@ impl Wrench {
     }
 
     pub fn scale(self, graph: &mut Graph, factor: Node) -> Wrench {
-        Wrench {
-            moment: vector::scale(graph, factor, self.moment),
-            force: vector::scale(graph, factor, self.force),
-        }
+        Wrench { moment: vector::scale(graph, factor, self.moment), force: vector::scale(graph, factor, self.force) }
     }
 
     /// Power on a motion (angular, linear).

@@ -1,7 +1,6 @@
 //! The stage's one entry.
 
 use super::articulated::{self, Accelerated, Inertia, Wrench};
-use super::error::{ACCELERATION_IN_LOAD, MechanicsError, NO_INERTIA, UNKNOWN_SYMBOL};
 use super::forces::{self, Effect, ForceGeometry};
 use super::kinematics::{self, FrameMotion, SpatialMotion};
 use super::scale::typical_magnitude;
@@ -9,7 +8,7 @@ use super::starts::starts;
 use super::system::{Output, StartEquation, System, Variable, VariableKind};
 use super::topology::{Axis, Tree, spanning_tree};
 use super::vector;
-use crate::diagnostics::Span;
+use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::Dimension;
 use crate::study::{JointKind, PointMotion, Study};
@@ -24,7 +23,7 @@ use std::collections::HashMap;
 ///
 /// All mechanical faults found: bodies without connection to ground, closed loops, joints that move no mass, force
 /// elements without direction, loads that depend on accelerations, start values that nothing determines.
-pub fn derive(study: &Study) -> Result<System, Vec<MechanicsError>> {
+pub fn derive(study: &Study) -> Result<System, Vec<Diagnostic>> {
     let mut graph = study.graph.clone();
     let tree = spanning_tree(study, &mut graph)?;
     let frames = kinematics::motion(&mut graph, &tree);
@@ -47,7 +46,7 @@ fn force_geometries(
     study: &Study,
     tree: &Tree,
     frames: &[FrameMotion],
-) -> Result<Vec<ForceGeometry>, Vec<MechanicsError>> {
+) -> Result<Vec<ForceGeometry>, Vec<Diagnostic>> {
     let mut geometries = Vec::new();
     let mut errors = Vec::new();
     for force in &study.forces {
@@ -103,11 +102,14 @@ fn kinematic_meaning(
 
 /// Symbols of accelerations, with the study's word for each.
 fn acceleration_symbols(study: &Study, tree: &Tree) -> Vec<(Symbol, String)> {
-    let joints = tree.links.iter().map(|link| {
-        (link.symbols.acceleration, format!("{}.acceleration", study.joints[link.joint].name))
-    });
+    let joints = tree
+        .links
+        .iter()
+        .map(|link| (link.symbols.acceleration, format!("{}.acceleration", study.joints[link.joint].name)));
     let points = study.point_quantities.iter().filter(|quantity| quantity.motion == PointMotion::Acceleration);
-    joints.chain(points.map(|quantity| (quantity.symbol, study.graph.symbol_name(quantity.symbol).to_owned()))).collect()
+    joints
+        .chain(points.map(|quantity| (quantity.symbol, study.graph.symbol_name(quantity.symbol).to_owned())))
+        .collect()
 }
 
 fn refuse_accelerations(
@@ -116,21 +118,22 @@ fn refuse_accelerations(
     tree: &Tree,
     loads: &[Node],
     meaning: &HashMap<Symbol, Node>,
-) -> Result<(), Vec<MechanicsError>> {
+) -> Result<(), Vec<Diagnostic>> {
     let accelerations = acceleration_symbols(study, tree);
     debug_assert!(accelerations.iter().all(|(symbol, _)| !meaning.contains_key(symbol)));
     let mut errors = Vec::new();
     for (force, &load) in study.forces.iter().zip(loads) {
         let used = graph.symbols_of(&[load]);
         for (_, name) in accelerations.iter().filter(|(symbol, _)| used.contains(symbol)) {
-            errors.push(MechanicsError {
-                code: ACCELERATION_IN_LOAD,
-                message: format!("the load of `{}` depends on the acceleration `{name}`", force.name),
-                labels: vec![(force.span, "loads may depend on positions and velocities only".into())],
-                help: "model what is accelerated as mass or inertia of a body, or pass the acceleration through a sensor \
-                       (a law with a state)"
-                    .into(),
-            });
+            let message = format!("the load of `{}` depends on the acceleration `{name}`", force.name);
+            errors.push(
+                Diagnostic::error(Code::ACCELERATION_IN_LOAD, message)
+                    .label(force.span, "loads may depend on positions and velocities only")
+                    .help(
+                        "model what is accelerated as mass or inertia of a body, or pass the acceleration through a \
+                         sensor (a law with a state)",
+                    ),
+            );
         }
     }
     if errors.is_empty() { Ok(()) } else { Err(errors) }
@@ -171,7 +174,7 @@ fn refuse_missing_inertia(
     tree: &Tree,
     inertias: &[Inertia],
     accelerated: &[Accelerated],
-) -> Result<(), Vec<MechanicsError>> {
+) -> Result<(), Vec<Diagnostic>> {
     let mut point: HashMap<Symbol, f64> = study.parameters.iter().map(|p| (p.symbol, p.start)).collect();
     for (number, link) in tree.links.iter().enumerate() {
         let general = match link.axis {
@@ -183,11 +186,12 @@ fn refuse_missing_inertia(
     let value = |roots: &[Node]| graph.evaluate(roots, |s| point.get(&s).copied().unwrap_or(0.0), |_, _, _| 0.0);
     let moved = value(&accelerated.iter().map(|a| a.moved_inertia).collect::<Vec<_>>());
     let all = |choose: fn(&Inertia) -> vector::Matrix| {
-        let diagonal: Vec<Node> = inertias.iter().flat_map(|i| (0..3).map(|k| choose(i)[k][k]).collect::<Vec<_>>()).collect();
+        let diagonal: Vec<Node> =
+            inertias.iter().flat_map(|i| (0..3).map(|k| choose(i)[k][k]).collect::<Vec<_>>()).collect();
         value(&diagonal).into_iter().map(f64::abs).fold(0.0, f64::max)
     };
     let (rotational, translational) = (all(|i| i.rotational), all(|i| i.translational));
-    let errors: Vec<MechanicsError> = tree
+    let errors: Vec<Diagnostic> = tree
         .links
         .iter()
         .zip(moved)
@@ -201,7 +205,7 @@ fn refuse_missing_inertia(
     if errors.is_empty() { Ok(()) } else { Err(errors) }
 }
 
-fn no_inertia(study: &Study, tree: &Tree, joint: usize) -> MechanicsError {
+fn no_inertia(study: &Study, tree: &Tree, joint: usize) -> Diagnostic {
     let body = tree.walk.iter().find(|(number, _)| *number == joint).map(|&(_, body)| &study.bodies[body]);
     let joint = &study.joints[joint];
     let body_name = body.map_or("ground", |body| body.name.as_str());
@@ -209,14 +213,13 @@ fn no_inertia(study: &Study, tree: &Tree, joint: usize) -> MechanicsError {
         JointKind::Revolute { .. } => ("moment of inertia", "inertia = 0.1 kg*m^2"),
         JointKind::Prismatic { .. } | JointKind::Fixed => ("mass", "mass = 1 kg"),
     };
-    let mut labels = vec![(joint.span, format!("its acceleration is undetermined: it moves no {lacks}"))];
-    labels.extend(body.map(|body| (body.span, format!("`{body_name}` and what hangs on it is without {lacks} here"))));
-    MechanicsError {
-        code: NO_INERTIA,
-        message: format!("joint `{}` moves body `{body_name}` without {lacks}", joint.name),
-        labels,
-        help: format!("give `{body_name}` a positive {lacks} (`{field}`), or replace the joint by a fixed one"),
+    let mut finding =
+        Diagnostic::error(Code::NO_INERTIA, format!("joint `{}` moves body `{body_name}` without {lacks}", joint.name))
+            .label(joint.span, format!("its acceleration is undetermined: it moves no {lacks}"));
+    if let Some(body) = body {
+        finding = finding.secondary(body.span, format!("`{body_name}` and what hangs on it is without {lacks} here"));
     }
+    finding.help(format!("give `{body_name}` a positive {lacks} (`{field}`), or replace the joint by a fixed one"))
 }
 
 fn add_accelerations(
@@ -247,7 +250,7 @@ fn assemble(
     tree: &Tree,
     accelerated: &[Accelerated],
     meaning: &HashMap<Symbol, Node>,
-) -> Result<System, Vec<MechanicsError>> {
+) -> Result<System, Vec<Diagnostic>> {
     let moving: Vec<usize> = tree.link_of_joint.iter().flatten().copied().collect();
     let states = state_variables(study, tree, &moving);
     let mut rates: Vec<Node> = moving.iter().map(|&link| graph.variable(tree.links[link].symbols.velocity)).collect();
@@ -257,7 +260,8 @@ fn assemble(
 
     let values: Vec<Node> = study.measures.iter().map(|measure| measure.value).collect();
     let values = graph.substitute(&values, meaning);
-    let name_and_value = |(measure, value): (&crate::study::Measure, Node)| Output { name: measure.name.clone(), value };
+    let name_and_value =
+        |(measure, value): (&crate::study::Measure, Node)| Output { name: measure.name.clone(), value };
     let outputs: Vec<Output> = study.measures.iter().zip(values).map(name_and_value).collect();
     let probes = probes(&mut graph, study, meaning);
     let starts = all_starts(&mut graph, study, &states, meaning)?;
@@ -323,7 +327,7 @@ fn all_starts(
     study: &Study,
     states: &[Variable],
     meaning: &HashMap<Symbol, Node>,
-) -> Result<Vec<Vec<StartEquation>>, Vec<MechanicsError>> {
+) -> Result<Vec<Vec<StartEquation>>, Vec<Diagnostic>> {
     let initial: Vec<Node> = study.states.iter().map(|state| state.initial).collect();
     let initial = graph.substitute(&initial, meaning);
     let initial: HashMap<Symbol, Node> = study.states.iter().map(|state| state.symbol).zip(initial).collect();
@@ -343,19 +347,19 @@ fn all_starts(
 }
 
 /// Everything that is left must be time, a state or a parameter.
-fn refuse_unknown_symbols(study: &Study, system: &System) -> Result<(), Vec<MechanicsError>> {
+fn refuse_unknown_symbols(study: &Study, system: &System) -> Result<(), Vec<Diagnostic>> {
     let mut known: Vec<Symbol> = system.states.iter().map(|state| state.symbol).collect();
     known.extend(&system.parameters);
     known.push(system.time);
     let mut errors = Vec::new();
     let mut check = |what: &str, node: Node, span: Span| {
         for symbol in system.graph.symbols_of(&[node]).into_iter().filter(|symbol| !known.contains(symbol)) {
-            errors.push(MechanicsError {
-                code: UNKNOWN_SYMBOL,
-                message: format!("{what} depends on `{}`, which nothing defines", system.graph.symbol_name(symbol)),
-                labels: vec![(span, "used here".into())],
-                help: "identify it as a parameter, declare it as a constant, or attach it to an element".into(),
-            });
+            let name = system.graph.symbol_name(symbol);
+            errors.push(
+                Diagnostic::error(Code::UNKNOWN_QUANTITY, format!("{what} depends on `{name}`, which nothing defines"))
+                    .label(span, "used here")
+                    .help("identify it as a parameter, declare it as a constant, or attach it to an element"),
+            );
         }
     };
     let moving: Vec<Span> = study.joints.iter().filter(|j| j.coordinate.is_some()).map(|j| j.span).collect();

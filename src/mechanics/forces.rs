@@ -1,10 +1,10 @@
 //! Force elements: elongation, rate, and what a unit of load does to the links.
 
 use super::articulated::Wrench;
-use super::error::{COINCIDENT_POINTS, FORCE_ON_FIXED_JOINT, MechanicsError};
 use super::kinematics::{self, FrameMotion};
 use super::topology::{Seat, Tree};
 use super::vector::{self, Vector};
+use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::{Graph, Node};
 use crate::study::{Force, ForcePlace, Study};
 
@@ -31,7 +31,7 @@ pub(super) fn geometry(
     tree: &Tree,
     frames: &[FrameMotion],
     force: &Force,
-) -> Result<ForceGeometry, MechanicsError> {
+) -> Result<ForceGeometry, Diagnostic> {
     match &force.place {
         ForcePlace::Joint(joint) => at_joint(graph, study, tree, force, *joint),
         ForcePlace::Between { first, second, along, free_length } => {
@@ -50,15 +50,14 @@ fn at_joint(
     tree: &Tree,
     force: &Force,
     joint: usize,
-) -> Result<ForceGeometry, MechanicsError> {
+) -> Result<ForceGeometry, Diagnostic> {
     let Some(link) = tree.link_of_joint[joint] else {
         let joint = &study.joints[joint];
-        return Err(MechanicsError {
-            code: FORCE_ON_FIXED_JOINT,
-            message: format!("force `{}` acts on joint `{}`, which cannot move", force.name, joint.name),
-            labels: vec![(force.span, "acts on a fixed joint".into()), (joint.span, "fixed here".into())],
-            help: "attach the force to a joint that can move, or between two bodies".into(),
-        });
+        let message = format!("force `{}` acts on joint `{}`, which cannot move", force.name, joint.name);
+        return Err(Diagnostic::error(Code::FORCE_ON_FIXED_JOINT, message)
+            .label(force.span, "acts on a fixed joint")
+            .secondary(joint.span, "fixed here")
+            .help("attach the force to a joint that can move, or between two bodies"));
     };
     let symbols = tree.links[link].symbols;
     Ok(ForceGeometry {
@@ -85,19 +84,17 @@ fn between_points(
     ends: [Seat; 2],
     free_length: Option<Node>,
     force: &Force,
-) -> Result<ForceGeometry, MechanicsError> {
+) -> Result<ForceGeometry, Diagnostic> {
     let [first, second] = ends.map(|end| kinematics::point_position(graph, frames, end));
     let relative = vector::subtract(graph, second, first);
     let [first, second] = ends.map(|end| kinematics::point_reference(graph, frames, end));
     let drawn = vector::subtract(graph, second, first);
     let drawn_length = vector::norm(graph, drawn);
     if graph.is_zero(drawn_length) {
-        return Err(MechanicsError {
-            code: COINCIDENT_POINTS,
-            message: format!("the end points of force `{}` coincide in the reference configuration", force.name),
-            labels: vec![(force.span, "no direction to act along".into())],
-            help: "name a direction with `along`, or attach it to points that are apart".into(),
-        });
+        let message = format!("the end points of force `{}` coincide in the reference configuration", force.name);
+        return Err(Diagnostic::error(Code::COINCIDENT_POINTS, message)
+            .label(force.span, "no direction to act along")
+            .help("name a direction with `along`, or attach it to points that are apart"));
     }
     let length = vector::norm(graph, relative);
     let one = graph.constant(1.0);

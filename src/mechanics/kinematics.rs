@@ -114,12 +114,7 @@ fn turned_away(graph: &mut Graph, orientation: Matrix, point: Vector) -> Vector 
 }
 
 /// A spatial motion vector (angular, linear at the predecessor's origin, predecessor axes) seen at the link.
-pub(super) fn carry(
-    graph: &mut Graph,
-    rotation: Matrix,
-    shift: Vector,
-    motion: SpatialMotion,
-) -> (Vector, Vector) {
+pub(super) fn carry(graph: &mut Graph, rotation: Matrix, shift: Vector, motion: SpatialMotion) -> (Vector, Vector) {
     let lever = vector::cross(graph, motion.angular, shift);
     let linear = vector::add(graph, motion.linear, lever);
     (vector::apply_transposed(graph, rotation, motion.angular), vector::apply_transposed(graph, rotation, linear))

@@ -9,7 +9,6 @@
 
 mod articulated;
 mod derive;
-mod error;
 mod forces;
 mod kinematics;
 mod scale;
@@ -19,5 +18,4 @@ mod topology;
 mod vector;
 
 pub use derive::derive;
-pub use error::MechanicsError;
 pub use system::*;

@@ -1,7 +1,7 @@
 //! How every experiment starts.
 
-use super::error::{MechanicsError, UNKNOWN_START};
 use super::system::{StartEquation, Variable, VariableKind};
+use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::{Graph, Node, Symbol};
 use crate::study::{Experiment, StartBase};
 use std::collections::HashMap;
@@ -15,7 +15,7 @@ pub(super) fn starts(
     experiment: &Experiment,
     initial: &HashMap<Symbol, Node>,
     overrides: &[(Symbol, Node)],
-) -> Result<Vec<StartEquation>, Vec<MechanicsError>> {
+) -> Result<Vec<StartEquation>, Vec<Diagnostic>> {
     let zero = graph.constant(0.0);
     let given: Vec<Option<Node>> = states
         .iter()
@@ -34,15 +34,15 @@ pub(super) fn starts(
         let Some(value) = value else { continue };
         let unknown = graph.symbols_of(&[*value]);
         if let Some(other) = states.iter().find(|other| unknown.contains(&other.symbol)) {
-            errors.push(MechanicsError {
-                code: UNKNOWN_START,
-                message: format!(
-                    "the start value of `{}` in experiment `{}` depends on `{}`, which is not known at the start",
-                    state.name, experiment.name, other.name
-                ),
-                labels: vec![(experiment.span, "started here".into())],
-                help: format!("give `{}` a start value by parameters and numbers only", state.name),
-            });
+            let message = format!(
+                "the start value of `{}` in experiment `{}` depends on `{}`, which is not known at the start",
+                state.name, experiment.name, other.name
+            );
+            errors.push(
+                Diagnostic::error(Code::UNKNOWN_START, message)
+                    .label(experiment.span, "started here")
+                    .help(format!("give `{}` a start value by parameters and numbers only", state.name)),
+            );
         }
     }
     if !errors.is_empty() {

@@ -1,7 +1,7 @@
 //! The spanning tree: which joint carries which body.
 
-use super::error::{CLOSED_LOOP, MechanicsError, UNCONNECTED_BODY};
 use super::vector::{self, Vector};
+use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::Graph;
 use crate::study::{Attachment, Joint, JointKind, JointSymbols, Study};
 use std::collections::VecDeque;
@@ -61,7 +61,7 @@ impl Tree {
 }
 
 /// Walks from ground over the joints, breadth first in order of declaration.
-pub(super) fn spanning_tree(study: &Study, graph: &mut Graph) -> Result<Tree, Vec<MechanicsError>> {
+pub(super) fn spanning_tree(study: &Study, graph: &mut Graph) -> Result<Tree, Vec<Diagnostic>> {
     let ground = study.bodies.len();
     let index = |attachment: &Attachment| attachment.body.unwrap_or(ground);
     let mut joints_at = vec![Vec::new(); ground + 1];
@@ -95,24 +95,20 @@ pub(super) fn spanning_tree(study: &Study, graph: &mut Graph) -> Result<Tree, Ve
     for (body, seat) in study.bodies.iter().zip(&seats) {
         match seat {
             Some(seat) => tree.seats.push(*seat),
-            None => errors.push(MechanicsError {
-                code: UNCONNECTED_BODY,
-                message: format!("body `{}` is not connected to ground", body.name),
-                labels: vec![(body.span, "no chain of joints leads from ground to here".into())],
-                help: format!("add a joint, for example `joint {0}_guide: prismatic(z) ground -> {0}`", body.name),
-            }),
+            None => errors.push(
+                Diagnostic::error(Code::UNCONNECTED_BODY, format!("body `{}` is not connected to ground", body.name))
+                    .label(body.span, "no chain of joints leads from ground to here")
+                    .help(format!("add a joint, for example `joint {0}_guide: prismatic(z) ground -> {0}`", body.name)),
+            ),
         }
     }
     if errors.is_empty() { Ok(tree) } else { Err(errors) }
 }
 
-fn closed_loop(joint: &Joint) -> MechanicsError {
-    MechanicsError {
-        code: CLOSED_LOOP,
-        message: format!("joint `{}` closes a kinematic loop", joint.name),
-        labels: vec![(joint.span, "both bodies are already connected by other joints".into())],
-        help: "only trees of joints are supported: remove this joint or replace it by a stiff force element".into(),
-    }
+fn closed_loop(joint: &Joint) -> Diagnostic {
+    Diagnostic::error(Code::CLOSED_LOOP, format!("joint `{}` closes a kinematic loop", joint.name))
+        .label(joint.span, "both bodies are already connected by other joints")
+        .help("only trees of joints are supported: remove this joint or replace it by a stiff force element")
 }
 
 impl Tree {

@@ -1,7 +1,7 @@
 //! Evaluation of a model for one parameter vector and one set of inputs.
 
-use super::model::{Element, Model};
 use super::InputSource;
+use super::model::{Element, Model};
 use crate::integrate::Dynamics;
 use crate::linear::SparsityPattern;
 
@@ -122,8 +122,7 @@ impl<'a> Bound<'a> {
     /// answered as equilibrium throughout.
     pub fn start_values(&mut self, experiment: usize, t0: f64) -> StartValues {
         let (n, p) = (self.model.dimension(), self.model.parameter_count());
-        let mut start =
-            StartValues { values: vec![0.0; n], derivatives: vec![0.0; n * p], equilibrium: vec![true; n] };
+        let mut start = StartValues { values: vec![0.0; n], derivatives: vec![0.0; n * p], equilibrium: vec![true; n] };
         let Some(program) = self.model.starts.get(experiment) else { return start };
         self.is_current = false;
         self.registers[self.model.layout.time] = t0;

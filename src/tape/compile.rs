@@ -239,7 +239,9 @@ impl<'a> Assembler<'a> {
                     readers[child].push(i);
                 }
             }
-            if waiting[i] == 0 && let Some(instruction) = instruction(operation) {
+            if waiting[i] == 0
+                && let Some(instruction) = instruction(operation)
+            {
                 ready.entry(instruction).or_default().push(i);
             }
         }
@@ -294,7 +296,9 @@ impl<'a> Assembler<'a> {
         let mut state_of_value = Vec::new();
         let mut registers = vec![None; state_count];
         for (state, equation) in equations.iter().enumerate() {
-            if matches!(equation, StartEquation::Value(_)) && let Some((_, value)) = given.next() {
+            if matches!(equation, StartEquation::Value(_))
+                && let Some((_, value)) = given.next()
+            {
                 registers[state] = Some(self.registers[value.index()]);
                 state_of_value.push(state);
             }

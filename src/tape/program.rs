@@ -11,7 +11,10 @@ pub(super) enum Instruction {
     /// Operands: condition, then, otherwise.
     Select,
     /// Operand: time.
-    Sample { input: u32, order: u8 },
+    Sample {
+        input: u32,
+        order: u8,
+    },
 }
 
 impl Instruction {

@@ -11,9 +11,8 @@ type Rotation = [[f64; 3]; 3];
 /// Right-handed axes whose third is `z`, as columns.
 fn axes_around(z: [f64; 3]) -> Rotation {
     let helper = if z[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let x = cross(helper, z);
     let length = x.iter().map(|c| c * c).sum::<f64>().sqrt();
     let x = x.map(|c| c / length);
@@ -80,8 +79,8 @@ fn double_pendulum_by_lagrange(q: [f64; 2], v: [f64; 2]) -> Vec<f64> {
     let m22 = b.inertia + b.mass * b.centre.powi(2);
     let coupling = b.mass * a.length * b.centre;
     let m12 = coupling * difference.cos();
-    let f1 = -coupling * difference.sin() * om[1].powi(2)
-        - GRAVITY * (a.mass * a.centre + b.mass * a.length) * th[0].sin();
+    let f1 =
+        -coupling * difference.sin() * om[1].powi(2) - GRAVITY * (a.mass * a.centre + b.mass * a.length) * th[0].sin();
     let f2 = coupling * difference.sin() * om[0].powi(2) - GRAVITY * b.mass * b.centre * th[1].sin();
     let determinant = m11 * m22 - m12 * m12;
     let alpha = [(f1 * m22 - f2 * m12) / determinant, (f2 * m11 - f1 * m12) / determinant];
