@@ -4,6 +4,16 @@
 //! recovers at the next declaration). *Must not happen here*: resolution of names, units or dimensions; reading
 //! files. The only module that names pest.
 
+mod build;
+mod build_expression;
+mod explain;
+mod grammar;
+mod print;
+mod read;
+mod scan;
+mod split;
 mod tree;
 
+pub use print::{print, print_expression, print_item};
+pub use read::parse;
 pub use tree::*;
