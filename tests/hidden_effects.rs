@@ -32,7 +32,7 @@ const CASES: [Case; 38] = [
     case("crane_pendulum", "quadratic_drag", "hook", Medium, 22),
     case("crane_pendulum", "viscous_damping", "hook", Strong, 23),
     case("crane_pendulum", "end_stop", "rail", Strong, 24),
-    case("crane_pendulum", "input_delay", "force", Medium, 25),
+    case("crane_pendulum", "input_delay", "drive_force", Medium, 25),
     case("crane_pendulum", "sensor_offset", "swing", Weak, 26),
     case("spring_slide", "damper_saturation", "damper", Strong, 27),
     case("spring_slide", "cubic_stiffness", "return_spring", Strong, 28),

@@ -264,3 +264,23 @@ fn a_record_carries_the_noise_it_claims() {
     let again = Record::measure(mechanism.as_ref(), &Effect::Nothing, 5, 1.0);
     assert_eq!(record.columns, again.columns);
 }
+
+/// The files in the repository are what `cargo run --example make_data` writes.
+#[test]
+fn shipped_records_are_up_to_date() {
+    for shipped in truth::shipped::records() {
+        let path = format!("{}/studies/{}/data/{}", env!("CARGO_MANIFEST_DIR"), shipped.study, shipped.file);
+        let text = std::fs::read_to_string(&path).expect("a shipped record is readable");
+        let mut lines = text.lines();
+        assert_eq!(lines.next().unwrap_or_default(), shipped.record.heads.join(","), "{path}");
+        let rows: Vec<Vec<f64>> =
+            lines.map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect()).collect();
+        for (column, values) in shipped.record.columns.iter().enumerate() {
+            assert_eq!(rows.len(), values.len(), "{path}");
+            let tolerance = 1e-4 * rms(values);
+            for (row, value) in rows.iter().zip(values) {
+                assert!((row[column] - value).abs() <= tolerance, "{path}: {} instead of {value}", row[column]);
+            }
+        }
+    }
+}

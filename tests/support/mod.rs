@@ -10,11 +10,10 @@ pub mod strength;
 use crate::truth::effect::Effect;
 use crate::truth::mechanism::Mechanism;
 use crate::truth::record::Record;
+use crate::truth::shipped::HELD_OUT_LEVEL;
 use std::path::{Path, PathBuf};
 pub use strength::Strength;
 
-/// Level of the held-out record's excitation relative to the estimation record's.
-const HELD_OUT_LEVEL: f64 = 1.1;
 /// The held-out record has phases and noise of its own.
 const HELD_OUT_SEED: u64 = 0x0DD5_EED5;
 

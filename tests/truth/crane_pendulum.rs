@@ -50,7 +50,7 @@ impl Mechanism for CranePendulum {
     }
 
     fn input(&self) -> Channel {
-        Channel { name: "force", unit: "N", factor: 1.0 }
+        Channel { name: "drive_force", unit: "N", factor: 1.0 }
     }
 
     fn channels(&self) -> &[Channel] {

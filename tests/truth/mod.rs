@@ -14,6 +14,7 @@ pub mod mechanism;
 pub mod quarter_vehicle;
 pub mod random;
 pub mod record;
+pub mod shipped;
 pub mod simulator;
 pub mod spring_slide;
 pub mod two_mass;

@@ -36,7 +36,7 @@ impl Mechanism for SpringSlide {
     }
 
     fn input(&self) -> Channel {
-        Channel { name: "force", unit: "N", factor: 1.0 }
+        Channel { name: "push_force", unit: "N", factor: 1.0 }
     }
 
     fn channels(&self) -> &[Channel] {

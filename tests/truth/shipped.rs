@@ -1,0 +1,38 @@
+//! The records of the shipped studies and what they hide.
+
+use super::effect::Effect;
+use super::record::Record;
+
+/// Level of the held-out record's excitation relative to the estimation record's.
+pub const HELD_OUT_LEVEL: f64 = 1.1;
+
+/// File names with seed and level of the excitation.
+const RECORDS: [(&str, u64, f64); 2] = [("estimation.csv", 101, 1.0), ("validation.csv", 202, HELD_OUT_LEVEL)];
+
+/// A record of a shipped study.
+pub struct Shipped {
+    pub study: &'static str,
+    pub file: &'static str,
+    pub record: Record,
+}
+
+/// Study, place and effect.
+const HIDDEN: [(&str, &str, fn(usize) -> Effect); 4] = [
+    ("quarter_vehicle", "chassis_guide", |place| Effect::DryFriction { place, load: 60.0 }),
+    ("two_mass", "coupling", |place| Effect::Backlash { place, gap: 0.025 }),
+    ("crane_pendulum", "hook", |place| Effect::QuadraticDrag { place, factor: 0.2 }),
+    ("spring_slide", "damper", |place| Effect::DamperSaturation { place, knee: 0.3, ratio: 0.25 }),
+];
+
+/// Simulates all of them.
+pub fn records() -> Vec<Shipped> {
+    let mut shipped = vec![];
+    for (study, place, hide) in HIDDEN {
+        let mechanism = super::mechanism(study).expect("each shipped study has its simulator");
+        let effect = hide(mechanism.place(place).expect("the place is one of the mechanism's"));
+        for (file, seed, level) in RECORDS {
+            shipped.push(Shipped { study, file, record: Record::measure(mechanism.as_ref(), &effect, seed, level) });
+        }
+    }
+    shipped
+}
