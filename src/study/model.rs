@@ -254,6 +254,9 @@ pub struct Experiment {
     pub time_column: String,
     /// (input or measure name, column name) where they differ.
     pub columns: Vec<(String, String)>,
+    /// Inputs (index into [`Study::inputs`], value in SI) that the record does not hold and that the experiment states
+    /// as constant: `inputs = { pulse = 0 V }`. Every other input needs its column.
+    pub constant_inputs: Vec<(usize, f64)>,
     /// Indices of the measures compared in this experiment (default: all).
     pub measures: Vec<usize>,
     /// Samples compared, s; the simulation starts at the record's first sample (or at `begin`).
