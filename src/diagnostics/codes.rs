@@ -4,10 +4,14 @@
 //! is what `ident explain` prints. To add a code, append a block to the stage's section.
 
 use std::fmt;
+use std::ops::Deref;
 
-/// What kind of finding a diagnostic reports. Compared by its text (`E0201`).
+/// What kind of finding a diagnostic reports: a reference into the table, compared by its text (`E0201`).
 #[derive(Clone, Copy)]
-pub struct Code {
+pub struct Code(&'static CodeEntry);
+
+/// A row of the table.
+pub struct CodeEntry {
     /// `E0201`
     pub text: &'static str,
     /// A few words, for lists.
@@ -20,6 +24,14 @@ impl Code {
     /// The code with this text, e.g. `E0201` (upper or lower case).
     pub fn find(text: &str) -> Option<Code> {
         Code::ALL.iter().copied().find(|code| code.text.eq_ignore_ascii_case(text))
+    }
+}
+
+impl Deref for Code {
+    type Target = CodeEntry;
+
+    fn deref(&self) -> &CodeEntry {
+        self.0
     }
 }
 
@@ -48,7 +60,7 @@ macro_rules! codes {
         impl Code {
             $(
                 #[doc = concat!("`", $text, "`: ", $title, ".")]
-                pub const $name: Code = Code { text: $text, title: $title, explanation: $explanation };
+                pub const $name: Code = Code(&CodeEntry { text: $text, title: $title, explanation: $explanation });
             )*
 
             /// Every code, in the order of the table.

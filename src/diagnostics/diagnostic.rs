@@ -18,6 +18,8 @@ pub enum Severity {
 pub struct Label {
     pub span: Span,
     pub text: String,
+    /// The place to look at first; the others explain it.
+    pub primary: bool,
 }
 
 /// A place in a data file, which is not among the sources of the study.
@@ -37,11 +39,8 @@ pub struct Diagnostic {
     pub code: Code,
     /// One line, in an engineer's words, without full stop.
     pub message: String,
-    /// The place to look at first.
-    pub primary: Vec<Label>,
-    /// Places that explain it.
-    pub secondary: Vec<Label>,
-    pub data: Option<DataPlace>,
+    pub labels: Vec<Label>,
+    pub data: Option<Box<DataPlace>>,
     pub help: Vec<String>,
     pub notes: Vec<String>,
 }
@@ -65,8 +64,7 @@ impl Diagnostic {
             severity,
             code,
             message: message.into(),
-            primary: Vec::new(),
-            secondary: Vec::new(),
+            labels: Vec::new(),
             data: None,
             help: Vec::new(),
             notes: Vec::new(),
@@ -75,19 +73,19 @@ impl Diagnostic {
 
     /// Marks the place of the finding.
     pub fn label(mut self, span: Span, text: impl Into<String>) -> Diagnostic {
-        self.primary.push(Label { span, text: text.into() });
+        self.labels.push(Label { span, text: text.into(), primary: true });
         self
     }
 
     /// Marks a place that explains the finding.
     pub fn secondary(mut self, span: Span, text: impl Into<String>) -> Diagnostic {
-        self.secondary.push(Label { span, text: text.into() });
+        self.labels.push(Label { span, text: text.into(), primary: false });
         self
     }
 
     /// Names a place in a data file.
     pub fn data(mut self, file: impl Into<String>, line: Option<u64>, column: Option<&str>) -> Diagnostic {
-        self.data = Some(DataPlace { file: file.into(), line, column: column.map(str::to_owned) });
+        self.data = Some(Box::new(DataPlace { file: file.into(), line, column: column.map(str::to_owned) }));
         self
     }
 
@@ -114,25 +112,20 @@ impl Diagnostic {
         self.severity == Severity::Error
     }
 
-    /// The span of the first label, for ordering.
+    /// The span to look at first, for ordering.
     pub fn span(&self) -> Option<Span> {
-        self.primary.first().or(self.secondary.first()).map(|label| label.span)
+        self.labels.iter().find(|label| label.primary).or(self.labels.first()).map(|label| label.span)
     }
 
     /// The finding with places as file, line and column.
     pub fn record(&self, sources: &Sources) -> Record {
-        let labels = |labels: &[Label], primary: bool| -> Vec<LabelRecord> {
-            labels.iter().filter_map(|label| LabelRecord::new(label, primary, sources)).collect()
-        };
-        let mut all = labels(&self.primary, true);
-        all.extend(labels(&self.secondary, false));
         Record {
             code: self.code.text,
             title: self.code.title,
             severity: self.severity,
             message: self.message.clone(),
-            labels: all,
-            data: self.data.clone(),
+            labels: self.labels.iter().filter_map(|label| LabelRecord::new(label, sources)).collect(),
+            data: self.data.as_deref().cloned(),
             help: self.help.clone(),
             notes: self.notes.clone(),
         }
@@ -164,7 +157,7 @@ pub struct LabelRecord {
 }
 
 impl LabelRecord {
-    fn new(label: &Label, primary: bool, sources: &Sources) -> Option<LabelRecord> {
+    fn new(label: &Label, sources: &Sources) -> Option<LabelRecord> {
         let start = sources.location(label.span.file, label.span.start)?;
         let end = sources.location(label.span.file, label.span.end)?;
         Some(LabelRecord {
@@ -173,8 +166,19 @@ impl LabelRecord {
             column: start.column,
             end_line: end.line,
             end_column: end.column,
-            primary,
+            primary: label.primary,
             text: label.text.clone(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Diagnostic;
+
+    /// Findings are returned as errors by value; clippy refuses errors of 128 bytes and more.
+    #[test]
+    fn findings_are_small_enough_to_be_returned() {
+        assert!(size_of::<Diagnostic>() < 128, "{}", size_of::<Diagnostic>());
     }
 }

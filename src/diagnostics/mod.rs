@@ -20,7 +20,7 @@ mod render;
 mod similar;
 mod sources;
 
-pub use codes::Code;
+pub use codes::{Code, CodeEntry};
 pub use diagnostic::{DataPlace, Diagnostic, Label, LabelRecord, Record, Severity};
 pub use render::render;
 pub use similar::similar_name;

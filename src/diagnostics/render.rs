@@ -55,16 +55,16 @@ fn translate(diagnostic: &Diagnostic, sources: &Sources) -> codespan::Diagnostic
         Severity::Warning => codespan::Severity::Warning,
         Severity::Note => codespan::Severity::Note,
     };
-    let primary = diagnostic.primary.iter().map(|label| (codespan::LabelStyle::Primary, label));
-    let secondary = diagnostic.secondary.iter().map(|label| (codespan::LabelStyle::Secondary, label));
-    let labels = primary
-        .chain(secondary)
-        .filter_map(|(style, label)| {
+    let labels = diagnostic
+        .labels
+        .iter()
+        .filter_map(|label| {
             let bytes = sources.bytes(label.span)?;
+            let style = if label.primary { codespan::LabelStyle::Primary } else { codespan::LabelStyle::Secondary };
             Some(codespan::Label::new(style, label.span.file, bytes).with_message(&label.text))
         })
         .collect();
-    let data = diagnostic.data.iter().map(data_note);
+    let data = diagnostic.data.iter().map(|place| data_note(place));
     let help = diagnostic.help.iter().map(|text| hanging("help", text));
     let notes = diagnostic.notes.iter().map(|text| hanging("note", text));
     codespan::Diagnostic::new(severity)
