@@ -4,6 +4,105 @@
 //! requested times. *Out*: a [`Solution`] at exactly the requested times, or a [`Failure`] as a value.
 //! *Must not happen here*: knowledge of bodies, laws, measurements or data.
 
+mod augmented;
+mod bdf;
+mod bdf_history;
+mod choice;
+mod consistent;
+mod newton;
+mod norm;
 mod problem;
+mod recorder;
+mod run;
+mod runge_kutta;
+mod stepper;
+mod tsitouras;
 
 pub use problem::*;
+
+use run::Run;
+
+/// Integrates from `start` and returns the solution at `times` (ascending, none before the start).
+///
+/// `breakpoints` are times at which the right-hand side may jump (steps of an input): a step ends exactly there and the
+/// method starts anew. Right-hand sides are taken as continuous from the right; up to a breakpoint they are evaluated
+/// just before it. Requested times do not shorten steps. Sensitivities are computed where `start.sensitivity` is given,
+/// as exact derivatives of the discrete solution for the steps taken.
+///
+/// # Errors
+///
+/// A [`Failure`] with time, cause, component to blame and the work so far.
+pub fn integrate<D: Dynamics + ?Sized>(
+    dynamics: &mut D,
+    start: &Start,
+    times: &[f64],
+    breakpoints: &[f64],
+    options: &Options,
+) -> Result<Solution, Failure> {
+    check(dynamics, start, times, options)?;
+    let mut run = Run::new(dynamics, start, times, options);
+    if !run.is_possible() {
+        return Err(invalid(start.time, None));
+    }
+    run.take_start();
+    let mut planned = 0;
+    for (end, discontinuous) in segments(start.time, times, breakpoints) {
+        let outcome = match &options.follow_plan {
+            Some(plan) => run.follow(plan, planned, end, discontinuous).map(|next| planned = next),
+            None => run.segment(end, discontinuous),
+        };
+        if let Err(refusal) = outcome {
+            return Err(refusal.with_work(run.system.work));
+        }
+    }
+    Ok(run.recorder.finish(run.system.work))
+}
+
+/// Ends of the segments between start, breakpoints and last requested time; true where it is a breakpoint.
+fn segments(start: f64, times: &[f64], breakpoints: &[f64]) -> Vec<(f64, bool)> {
+    let Some(&last) = times.last().filter(|&&last| last > start) else { return Vec::new() };
+    let mut ends: Vec<f64> = breakpoints.iter().copied().filter(|b| *b > start && *b < last).collect();
+    ends.sort_by(f64::total_cmp);
+    ends.dedup();
+    let mut segments: Vec<_> = ends.into_iter().map(|end| (end, true)).collect();
+    segments.push((last, breakpoints.contains(&last)));
+    segments
+}
+
+fn check<D: Dynamics + ?Sized>(
+    dynamics: &D,
+    start: &Start,
+    times: &[f64],
+    options: &Options,
+) -> Result<(), Failure> {
+    let (n, p) = (dynamics.dimension(), dynamics.parameter_count());
+    let positive = |values: &[f64]| values.iter().position(|v| !(*v > 0.0 && v.is_finite()));
+    if let Some(component) = positive(dynamics.scale()) {
+        return Err(invalid(start.time, Some(component)));
+    }
+    let lengths = start.y.len() == n
+        && start.y_prime.len() == n
+        && dynamics.scale().len() == n
+        && dynamics.differential().len() == n
+        && (start.sensitivity.is_empty() || start.sensitivity.len() == n * p)
+        && (dynamics.parameter_scale().is_empty() || dynamics.parameter_scale().len() == p);
+    let order = start.time.is_finite()
+        && times.first().is_none_or(|t| *t >= start.time)
+        && times.windows(2).all(|w| w[0] <= w[1])
+        && times.last().is_none_or(|t| t.is_finite());
+    let tolerances = positive(&[options.relative_tolerance, options.absolute_factor]).is_none()
+        && options.initial_step.is_none_or(|h| h > 0.0)
+        && options.maximum_step.is_none_or(|h| h > 0.0)
+        && positive(dynamics.parameter_scale()).is_none();
+    if !(lengths && order && tolerances) {
+        return Err(invalid(start.time, None));
+    }
+    match start.y.iter().position(|v| !v.is_finite()) {
+        Some(component) => Err(Failure { cause: FailureCause::InconsistentStart, ..invalid(start.time, Some(component)) }),
+        None => Ok(()),
+    }
+}
+
+fn invalid(time: f64, component: Option<usize>) -> Failure {
+    Failure { time, cause: FailureCause::InvalidRequest, component, work: Work::default() }
+}

@@ -29,10 +29,46 @@ pub trait Dynamics {
     /// dF/dtheta, n x p column-major.
     fn parameter_derivative(&mut self, t: f64, y: &[f64], y_prime: &[f64], values: &mut [f64]);
 
+    /// Structure of dF/dtheta (n x p) where the implementation knows it; none means full, column-major. Explicit
+    /// integration of large systems spends much of its time on the zeros of a full one.
+    fn parameter_pattern(&self) -> Option<&SparsityPattern> {
+        None
+    }
+
+    /// Values of dF/dtheta in the order of [`Dynamics::parameter_pattern`]. Must be given along with a pattern.
+    fn parameter_entries(&mut self, t: f64, y: &[f64], y_prime: &[f64], values: &mut [f64]) {
+        self.parameter_derivative(t, y, y_prime, values);
+    }
+
+    /// Typical magnitude per parameter (SI, positive), length p: the absolute tolerance of a sensitivity is that of its
+    /// component divided by it. Empty where unknown; then each column is measured by its own largest value so far.
+    fn parameter_scale(&self) -> &[f64] {
+        &[]
+    }
+
     /// For systems of the form `y' - f(t, y) = 0` without algebraic components: `f` into `rates`, and true.
     /// Explicit methods need it.
     fn explicit_rates(&mut self, _t: f64, _y: &[f64], _rates: &mut [f64]) -> bool {
         false
+    }
+
+    /// `f`, dF/dy (values of [`Dynamics::jacobian`] with c = 0) and [`Dynamics::parameter_entries`] at one point, for
+    /// systems with [`Dynamics::explicit_rates`]. One call, so that an implementation can share common work; this is the
+    /// inner loop of explicit integration with sensitivities.
+    fn linearised_rates(
+        &mut self,
+        t: f64,
+        y: &[f64],
+        rates: &mut [f64],
+        jacobian: &mut [f64],
+        parameter_entries: &mut [f64],
+    ) -> bool {
+        if !self.explicit_rates(t, y, rates) {
+            return false;
+        }
+        self.jacobian(t, y, rates, 0.0, jacobian);
+        self.parameter_entries(t, y, rates, parameter_entries);
+        true
     }
 
     /// Name of component `i` in the study's words, for messages.
@@ -52,7 +88,27 @@ pub struct Options {
     pub method: MethodChoice,
     pub maximum_steps: usize,
     pub initial_step: Option<f64>,
+    /// Upper bound of the step. Without one, a start at rest lets the step grow past short inputs that begin later.
     pub maximum_step: Option<f64>,
+    /// Keep the sequence of steps in [`Solution::plan`].
+    pub record_plan: bool,
+    /// Follow this sequence of steps instead of controlling the error: the solution becomes a smooth function of the
+    /// parameters, whose derivative the sensitivities of the recorded run are (internal differentiation).
+    pub follow_plan: Option<std::sync::Arc<Plan>>,
+}
+
+/// A sequence of accepted steps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    pub steps: Vec<PlannedStep>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlannedStep {
+    /// Time at the end of the step.
+    pub end: f64,
+    /// Order of the BDF; 0 for an explicit step.
+    pub order: u8,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +128,8 @@ impl Default for Options {
             maximum_steps: 2_000_000,
             initial_step: None,
             maximum_step: None,
+            record_plan: false,
+            follow_plan: None,
         }
     }
 }
@@ -97,12 +155,19 @@ pub struct Solution {
     /// N blocks of n x p column-major; empty for a nominal run.
     pub sensitivity: Vec<f64>,
     pub work: Work,
+    /// With [`Options::record_plan`].
+    pub plan: Option<Plan>,
 }
 
 /// Counts of work.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Work {
+    /// The method at the end of the run.
     pub method: &'static str,
+    /// Why this method.
+    pub reason: String,
+    /// Changes of method: time and the method from there on.
+    pub switches: Vec<(f64, &'static str)>,
     pub steps: usize,
     pub rejected_error: usize,
     pub rejected_newton: usize,
@@ -112,6 +177,8 @@ pub struct Work {
     pub newton_iterations: usize,
     /// Steps whose size was limited by component i.
     pub limited_by: Vec<usize>,
+    /// First and last time at which component i limited the step.
+    pub limited_span: Vec<(f64, f64)>,
 }
 
 /// Why an integration could not go on.
@@ -134,4 +201,9 @@ pub enum FailureCause {
     SingularMatrix,
     InconsistentStart,
     NoEquilibrium,
+    /// The implicit equations of a step could not be solved however small the step.
+    NoConvergence,
+    /// Times not ascending or before the start, wrong lengths, tolerances or scales not positive, or an explicit method
+    /// forced on a system without explicit rates.
+    InvalidRequest,
 }

@@ -1,0 +1,153 @@
+//! The system together with its sensitivity equations, in the layout the inner loops want.
+
+use super::problem::{Dynamics, Work};
+
+/// Wraps [`Dynamics`] for a vector `z` of length n (1 + p): first y, then the sensitivities row by row (component i,
+/// then parameter j), so that operations on a row run over all parameters without a gap.
+pub(super) struct Augmented<'d, D: ?Sized> {
+    pub dynamics: &'d mut D,
+    pub n: usize,
+    /// Number of sensitivity columns carried; 0 in a nominal run.
+    pub p: usize,
+    pub work: Work,
+    pub explicit: bool,
+    /// Right-hand sides are never evaluated beyond this time, so that a step that ends at a discontinuity of the input
+    /// sees its left limit.
+    pub last_time: f64,
+    pub jacobian: Vec<f64>,
+    pub jacobian_rows: Vec<usize>,
+    pub jacobian_columns: Vec<usize>,
+    mass: Vec<f64>,
+    parameter: Vec<f64>,
+    parameter_places: Vec<usize>,
+}
+
+impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
+    pub fn new(dynamics: &'d mut D, with_sensitivities: bool, t: f64, y: &[f64]) -> Self {
+        let n = dynamics.dimension();
+        let p = if with_sensitivities { dynamics.parameter_count() } else { 0 };
+        let pattern = dynamics.pattern();
+        let jacobian_rows = pattern.rows.clone();
+        let jacobian_columns: Vec<usize> =
+            (0..n).flat_map(|j| std::iter::repeat_n(j, pattern.starts[j + 1] - pattern.starts[j])).collect();
+        let parameter_places: Vec<usize> = match dynamics.parameter_pattern() {
+            Some(pattern) if p > 0 => (0..p)
+                .flat_map(|j| pattern.rows[pattern.starts[j]..pattern.starts[j + 1]].iter().map(move |row| row * p + j))
+                .collect(),
+            _ => (0..p).flat_map(|j| (0..n).map(move |row| row * p + j)).collect(),
+        };
+        let explicit = dynamics.explicit_rates(t, y, &mut vec![0.0; n]);
+        let work = Work { limited_by: vec![0; n], limited_span: vec![(f64::NAN, f64::NAN); n], ..Work::default() };
+        Self {
+            dynamics,
+            n,
+            p,
+            work,
+            explicit,
+            last_time: f64::INFINITY,
+            jacobian: vec![0.0; jacobian_rows.len()],
+            mass: vec![0.0; jacobian_rows.len()],
+            jacobian_rows,
+            jacobian_columns,
+            parameter: vec![0.0; parameter_places.len()],
+            parameter_places,
+        }
+    }
+
+    /// Length of `z`.
+    pub fn length(&self) -> usize {
+        self.n * (1 + self.p)
+    }
+
+    /// `z' = (f, f_y S + f_theta)` of a system with explicit rates.
+    pub fn rates(&mut self, t: f64, z: &[f64], rates: &mut [f64]) {
+        let t = t.min(self.last_time);
+        let (y, s) = z.split_at(self.n);
+        let (y_rates, s_rates) = rates.split_at_mut(self.n);
+        self.work.residuals += 1;
+        if self.p == 0 {
+            self.dynamics.explicit_rates(t, y, y_rates);
+            return;
+        }
+        self.work.jacobians += 1;
+        self.dynamics.linearised_rates(t, y, y_rates, &mut self.jacobian, &mut self.parameter);
+        s_rates.fill(0.0);
+        subtract_product(&self.jacobian, &self.jacobian_rows, &self.jacobian_columns, s, s_rates, self.p);
+        self.subtract_parameter_entries(s_rates);
+    }
+
+    pub fn residual(&mut self, t: f64, y: &[f64], y_prime: &[f64], residual: &mut [f64]) {
+        self.work.residuals += 1;
+        self.dynamics.residual(t.min(self.last_time), y, y_prime, residual);
+    }
+
+    /// Values of dF/dy + c dF/dy' into `self.jacobian`.
+    pub fn linearise(&mut self, t: f64, y: &[f64], y_prime: &[f64], c: f64) {
+        self.work.jacobians += 1;
+        self.dynamics.jacobian(t.min(self.last_time), y, y_prime, c, &mut self.jacobian);
+    }
+
+    /// `-(dF/dy' V + dF/dtheta)` into `result` (n x p row by row). `self.jacobian` must hold the values at this point
+    /// for `c`, which must not be zero.
+    pub fn sensitivity_right_hand_side(
+        &mut self,
+        t: f64,
+        y: &[f64],
+        y_prime: &[f64],
+        c: f64,
+        v: &[f64],
+        result: &mut [f64],
+    ) {
+        let t = t.min(self.last_time);
+        if self.explicit {
+            for (r, v) in result.iter_mut().zip(v) {
+                *r = -v;
+            }
+        } else {
+            self.dynamics.jacobian(t, y, y_prime, 0.0, &mut self.mass);
+            for (m, j) in self.mass.iter_mut().zip(&self.jacobian) {
+                *m = (j - *m) / c;
+            }
+            result.fill(0.0);
+            subtract_product(&self.mass, &self.jacobian_rows, &self.jacobian_columns, v, result, self.p);
+        }
+        self.dynamics.parameter_entries(t, y, y_prime, &mut self.parameter);
+        self.subtract_parameter_entries(result);
+    }
+
+    /// `-dF/dtheta` into `result` (n x p row by row).
+    pub fn parameter_right_hand_side(&mut self, t: f64, y: &[f64], y_prime: &[f64], result: &mut [f64]) {
+        self.dynamics.parameter_entries(t.min(self.last_time), y, y_prime, &mut self.parameter);
+        result.fill(0.0);
+        self.subtract_parameter_entries(result);
+    }
+
+    fn subtract_parameter_entries(&self, target: &mut [f64]) {
+        for (&place, value) in self.parameter_places.iter().zip(&self.parameter) {
+            target[place] -= value;
+        }
+    }
+
+    /// Notes that `component` had the largest share in the error of the step that ends at `t`.
+    pub fn blame(&mut self, component: usize, t: f64) {
+        self.work.limited_by[component] += 1;
+        let span = &mut self.work.limited_span[component];
+        if span.0.is_nan() {
+            span.0 = t;
+        }
+        span.1 = t;
+    }
+}
+
+/// `result -= A V` for sparse `A` and row-major `V` of `width` columns.
+fn subtract_product(values: &[f64], rows: &[usize], columns: &[usize], v: &[f64], result: &mut [f64], width: usize) {
+    for ((value, row), column) in values.iter().zip(rows).zip(columns) {
+        if *value == 0.0 {
+            continue;
+        }
+        let target = &mut result[row * width..][..width];
+        for (r, v) in target.iter_mut().zip(&v[column * width..][..width]) {
+            *r -= value * v;
+        }
+    }
+}

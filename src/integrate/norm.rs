@@ -1,0 +1,172 @@
+//! How large an error is, measured by the tolerances.
+
+use super::problem::{Dynamics, Options};
+
+/// Weights of the error control: component i of the state may err by `relative |y_i| + absolute_i`, the sensitivity of
+/// component i to parameter j by `relative |S_ij| + absolute_i / parameter_scale_j`.
+///
+/// The error of the state and of each sensitivity column is the root mean square of the scaled errors of the
+/// differential components; the norm is the largest of these. Algebraic components do not count: their error follows
+/// the others', and in an index-2 system it is not small of the order of the method (Brenan-Campbell-Petzold-1996).
+pub(super) struct ErrorNorm {
+    n: usize,
+    p: usize,
+    relative: f64,
+    absolute: Vec<f64>,
+    /// 1 / parameter scale; grown from the columns themselves where `adaptive`.
+    column_scale: Vec<f64>,
+    adaptive: bool,
+    inverse_scale: Vec<f64>,
+    differential: Vec<bool>,
+    all_differential: bool,
+    inverse_count: f64,
+    /// 1 / weight of each element of z.
+    inverse_weight: Vec<f64>,
+    columns: Vec<f64>,
+}
+
+/// An error by the norm, and who is to blame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size {
+    /// Infinite where the error is not a finite number.
+    pub norm: f64,
+    /// Component with the largest scaled error (of the state).
+    pub component: usize,
+}
+
+impl ErrorNorm {
+    /// `p`: number of sensitivity columns under control.
+    pub fn new<D: Dynamics + ?Sized>(dynamics: &D, options: &Options, p: usize) -> Self {
+        let n = dynamics.dimension();
+        let differential = dynamics.differential().to_vec();
+        let count = differential.iter().filter(|d| **d).count().max(1);
+        let parameter_scale = dynamics.parameter_scale();
+        let adaptive = parameter_scale.is_empty();
+        let column_scale = if adaptive { vec![0.0; p] } else { parameter_scale[..p].iter().map(|s| 1.0 / s).collect() };
+        Self {
+            n,
+            p,
+            relative: options.relative_tolerance,
+            absolute: dynamics
+                .scale()
+                .iter()
+                .map(|s| options.relative_tolerance * options.absolute_factor * s)
+                .collect(),
+            column_scale,
+            adaptive,
+            inverse_scale: dynamics.scale().iter().map(|s| 1.0 / s).collect(),
+            all_differential: differential.iter().all(|d| *d),
+            differential,
+            inverse_count: 1.0 / count as f64,
+            inverse_weight: vec![0.0; n * (1 + p)],
+            columns: vec![0.0; p],
+        }
+    }
+
+    /// Sets the weights for values about `z`.
+    pub fn set_weights(&mut self, z: &[f64]) {
+        self.set_weights_between(z, z);
+    }
+
+    /// Sets the weights by the larger of two values per element.
+    pub fn set_weights_between(&mut self, old: &[f64], new: &[f64]) {
+        let n = self.n;
+        if self.adaptive && self.p > 0 {
+            self.grow_column_scale(&new[n..]);
+        }
+        for (((w, absolute), a), b) in self.inverse_weight[..n].iter_mut().zip(&self.absolute).zip(old).zip(new) {
+            *w = 1.0 / (self.relative * a.abs().max(b.abs()) + absolute);
+        }
+        if self.p == 0 {
+            return;
+        }
+        let rows = self.inverse_weight[n..].chunks_exact_mut(self.p);
+        let values = old[n..].chunks_exact(self.p).zip(new[n..].chunks_exact(self.p));
+        for ((weights, absolute), (old, new)) in rows.zip(&self.absolute).zip(values) {
+            for (((w, scale), a), b) in weights.iter_mut().zip(&self.column_scale).zip(old).zip(new) {
+                *w = 1.0 / (self.relative * a.abs().max(b.abs()) + absolute * scale);
+            }
+        }
+    }
+
+    fn grow_column_scale(&mut self, s: &[f64]) {
+        for (row, inverse_scale) in s.chunks_exact(self.p).zip(&self.inverse_scale) {
+            for (scale, value) in self.column_scale.iter_mut().zip(row) {
+                *scale = scale.max(value.abs() * inverse_scale).max(f64::MIN_POSITIVE.sqrt());
+            }
+        }
+    }
+
+    pub fn state_weights(&self) -> &[f64] {
+        &self.inverse_weight[..self.n]
+    }
+
+    /// Size of the state part of an error, algebraic components left out.
+    pub fn of_state(&self, error: &[f64]) -> Size {
+        let (mut sum, mut largest, mut component) = (0.0, 0.0, 0);
+        for i in 0..self.n {
+            let scaled = error[i] * self.inverse_weight[i];
+            let square = if self.differential[i] { scaled * scaled } else { 0.0 };
+            sum += square;
+            if square > largest {
+                largest = square;
+                component = i;
+            }
+        }
+        Size { norm: finite_root(sum * self.inverse_count), component }
+    }
+
+    /// Root mean square of all components of a correction of the state, for the convergence of Newton's method.
+    pub fn of_correction(&self, correction: &[f64]) -> f64 {
+        let sum: f64 = correction[..self.n].iter().zip(&self.inverse_weight).map(|(e, w)| (e * w) * (e * w)).sum();
+        finite_root(sum / self.n as f64)
+    }
+
+    /// Size of an error of the state and of the sensitivities under control.
+    pub fn of(&mut self, error: &[f64]) -> Size {
+        let state = self.of_state(error);
+        if self.p == 0 || !state.norm.is_finite() {
+            return state;
+        }
+        self.columns.fill(0.0);
+        let rows = error[self.n..].chunks_exact(self.p).zip(self.inverse_weight[self.n..].chunks_exact(self.p));
+        for (i, (error, weight)) in rows.enumerate() {
+            if !self.all_differential && !self.differential[i] {
+                continue;
+            }
+            for ((sum, e), w) in self.columns.iter_mut().zip(error).zip(weight) {
+                let scaled = e * w;
+                *sum += scaled * scaled;
+            }
+        }
+        // A sum is finite only if all its terms are; the maximum alone would lose a NaN.
+        let total: f64 = self.columns.iter().sum();
+        if !total.is_finite() {
+            return Size { norm: f64::INFINITY, ..state };
+        }
+        let (mut largest, mut column) = (0.0, 0);
+        for (j, &sum) in self.columns.iter().enumerate() {
+            if sum > largest {
+                (largest, column) = (sum, j);
+            }
+        }
+        let norm = (largest * self.inverse_count).sqrt();
+        if norm <= state.norm { state } else { Size { norm, component: self.worst_of_column(error, column) } }
+    }
+
+    fn worst_of_column(&self, error: &[f64], column: usize) -> usize {
+        let (mut largest, mut component) = (0.0, 0);
+        for i in (0..self.n).filter(|&i| self.differential[i]) {
+            let place = self.n + i * self.p + column;
+            let size = (error[place] * self.inverse_weight[place]).abs();
+            if size > largest {
+                (largest, component) = (size, i);
+            }
+        }
+        component
+    }
+}
+
+fn finite_root(mean_square: f64) -> f64 {
+    if mean_square.is_finite() { mean_square.sqrt() } else { f64::INFINITY }
+}

@@ -1,0 +1,72 @@
+//! What both methods have in common.
+
+use super::augmented::Augmented;
+use super::problem::{Dynamics, Failure, FailureCause, Options, Work};
+
+/// A step smaller than this many units of rounding of the time cannot be resolved.
+const SMALLEST_STEP: f64 = 16.0 * f64::EPSILON;
+/// The last step before a forced time is stretched by up to this factor rather than leaving a sliver.
+const STRETCH: f64 = 1.01;
+
+/// Why a method gave up, and where.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Refusal {
+    pub time: f64,
+    pub cause: FailureCause,
+    pub component: Option<usize>,
+}
+
+impl Refusal {
+    pub fn with_work(self, work: Work) -> Failure {
+        Failure { time: self.time, cause: self.cause, component: self.component, work }
+    }
+}
+
+/// Limits of the steps of one run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    pub maximum_steps: usize,
+    pub maximum_step: f64,
+    pub initial_step: Option<f64>,
+}
+
+impl Limits {
+    pub fn new(options: &Options) -> Self {
+        Self {
+            maximum_steps: options.maximum_steps,
+            maximum_step: options.maximum_step.unwrap_or(f64::INFINITY),
+            initial_step: options.initial_step,
+        }
+    }
+
+    /// The step to take from `t` so as not to pass `end`: (step, whether it reaches the end).
+    pub fn fit(&self, step: f64, t: f64, end: f64) -> (f64, bool) {
+        let step = step.min(self.maximum_step);
+        if t + STRETCH * step >= end { (end - t, true) } else { (step, false) }
+    }
+
+    /// Refuses further attempts once the budget is used up or the step has shrunk to rounding level.
+    pub fn check<D: Dynamics + ?Sized>(
+        &self,
+        system: &Augmented<D>,
+        t: f64,
+        step: f64,
+        reaches_end: bool,
+        trouble: (FailureCause, Option<usize>),
+    ) -> Result<(), Refusal> {
+        let work = &system.work;
+        if work.steps + work.rejected_error + work.rejected_newton >= self.maximum_steps {
+            return Err(Refusal { time: t, cause: FailureCause::TooManySteps, component: trouble.1 });
+        }
+        let too_small = step <= SMALLEST_STEP * t.abs().max(f64::MIN_POSITIVE);
+        if !step.is_finite() || (too_small && !reaches_end) {
+            return Err(Refusal { time: t, cause: trouble.0, component: trouble.1 });
+        }
+        Ok(())
+    }
+}
+
+/// First component that is not a finite number.
+pub(super) fn first_not_finite(values: &[f64]) -> Option<usize> {
+    values.iter().position(|v| !v.is_finite())
+}

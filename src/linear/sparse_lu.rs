@@ -1,0 +1,260 @@
+//! Sparse LU that reuses its symbolic part (Davis-Palamadai-2010): columns are ordered once by approximate minimum
+//! degree, the first factorisation finds pivots and the structure of the factors by Gilbert-Peierls-1988, and every
+//! further one only recomputes the numbers, until a pivot has become too small and pivots are sought anew.
+
+use super::factorisation::{SingularMatrix, subtract_row};
+use super::pattern::SparsityPattern;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::SymbolicSparseColMatRef;
+use faer::sparse::linalg::amd;
+
+/// The diagonal entry is taken as pivot while it is at least this share of the column's largest entry.
+const PREFER_DIAGONAL: f64 = 0.1;
+/// A reused pivot below this share of its column's largest remaining entry asks for new pivots.
+const REUSE_PIVOT: f64 = 1e-3;
+/// A column whose largest remaining scaled entry is below this counts as dependent.
+const SINGULAR: f64 = 1e-15;
+const NONE: usize = usize::MAX;
+
+/// `P R A Q = L U` with row scaling R, row exchanges P and column order Q.
+#[derive(Clone, Debug)]
+pub(super) struct SparseLu {
+    pattern: SparsityPattern,
+    /// Position k holds column `columns[k]`.
+    columns: Vec<usize>,
+    /// Position of each row as pivot.
+    position: Vec<usize>,
+    /// Row that is pivot at each position.
+    pivot_row: Vec<usize>,
+    lower: Triangle,
+    upper: Triangle,
+    inverse_pivot: Vec<f64>,
+    row_scale: Vec<f64>,
+    /// Dense column (by original row), zero between uses.
+    work: Vec<f64>,
+    block: Vec<f64>,
+    has_structure: bool,
+}
+
+/// Strictly triangular factor by columns.
+#[derive(Clone, Debug, Default)]
+struct Triangle {
+    starts: Vec<usize>,
+    /// Lower: original rows during factorisation. Upper: positions, in an order in which they can be eliminated.
+    rows: Vec<usize>,
+    /// Lower only: positions of `rows`, known when all pivots are.
+    positions: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Triangle {
+    fn clear(&mut self) {
+        self.starts.clear();
+        self.starts.push(0);
+        self.rows.clear();
+        self.values.clear();
+    }
+
+    fn column(&self, k: usize) -> std::ops::Range<usize> {
+        self.starts[k]..self.starts[k + 1]
+    }
+}
+
+impl SparseLu {
+    pub fn new(pattern: &SparsityPattern) -> Self {
+        let n = pattern.column_count;
+        Self {
+            pattern: pattern.clone(),
+            columns: minimum_degree(pattern),
+            position: vec![NONE; n],
+            pivot_row: vec![NONE; n],
+            lower: Triangle::default(),
+            upper: Triangle::default(),
+            inverse_pivot: vec![0.0; n],
+            row_scale: vec![0.0; n],
+            work: vec![0.0; n],
+            block: Vec::new(),
+            has_structure: false,
+        }
+    }
+
+    pub fn factor(&mut self, values: &[f64]) -> Result<(), SingularMatrix> {
+        self.row_scale.fill(0.0);
+        for (&row, value) in self.pattern.rows.iter().zip(values) {
+            self.row_scale[row] = self.row_scale[row].max(value.abs());
+        }
+        for scale in &mut self.row_scale {
+            *scale = 1.0 / *scale;
+        }
+        if self.has_structure && self.refactor(values) {
+            return Ok(());
+        }
+        self.has_structure = false;
+        self.work.fill(0.0);
+        self.find_structure(values)?;
+        self.has_structure = true;
+        Ok(())
+    }
+
+    /// Numbers only, with the pivots of before; false when one of them has become unsuitable.
+    fn refactor(&mut self, values: &[f64]) -> bool {
+        for k in 0..self.columns.len() {
+            self.scatter(k, values);
+            for u in self.upper.column(k) {
+                let j = self.upper.rows[u];
+                let factor = std::mem::take(&mut self.work[self.pivot_row[j]]);
+                self.upper.values[u] = factor;
+                if factor != 0.0 {
+                    for l in self.lower.column(j) {
+                        self.work[self.lower.rows[l]] -= self.lower.values[l] * factor;
+                    }
+                }
+            }
+            let pivot = std::mem::take(&mut self.work[self.pivot_row[k]]);
+            let largest = self.lower.column(k).fold(pivot.abs(), |a, l| a.max(self.work[self.lower.rows[l]].abs()));
+            if !(pivot.abs() > SINGULAR && pivot.abs() >= REUSE_PIVOT * largest && largest.is_finite()) {
+                return false;
+            }
+            self.inverse_pivot[k] = 1.0 / pivot;
+            for l in self.lower.column(k) {
+                self.lower.values[l] = std::mem::take(&mut self.work[self.lower.rows[l]]) * self.inverse_pivot[k];
+            }
+        }
+        true
+    }
+
+    /// Adds scaled column k of the matrix to the work column.
+    fn scatter(&mut self, k: usize, values: &[f64]) {
+        let column = self.columns[k];
+        for entry in self.pattern.starts[column]..self.pattern.starts[column + 1] {
+            let row = self.pattern.rows[entry];
+            self.work[row] = values[entry] * self.row_scale[row];
+        }
+    }
+
+    /// Pivots and structure along with the numbers. Structural entries are kept even where their value is zero now.
+    fn find_structure(&mut self, values: &[f64]) -> Result<(), SingularMatrix> {
+        let n = self.columns.len();
+        self.position.fill(NONE);
+        self.lower.clear();
+        self.upper.clear();
+        let mut reached = vec![NONE; n];
+        let mut order = Vec::with_capacity(n);
+        for k in 0..n {
+            order.clear();
+            let column = self.columns[k];
+            for entry in self.pattern.starts[column]..self.pattern.starts[column + 1] {
+                self.reach(self.pattern.rows[entry], k, &mut reached, &mut order);
+            }
+            self.scatter(k, values);
+            for &row in order.iter().rev() {
+                let j = self.position[row];
+                if j == NONE {
+                    continue;
+                }
+                let factor = std::mem::take(&mut self.work[row]);
+                self.upper.rows.push(j);
+                self.upper.values.push(factor);
+                for l in self.lower.column(j) {
+                    self.work[self.lower.rows[l]] -= self.lower.values[l] * factor;
+                }
+            }
+            self.upper.starts.push(self.upper.rows.len());
+            self.choose_pivot(k, &order)?;
+        }
+        self.lower.positions = self.lower.rows.iter().map(|&row| self.position[row]).collect();
+        Ok(())
+    }
+
+    /// Depth-first search: appends every row that elimination makes non-zero, dependants first.
+    fn reach(&self, start: usize, k: usize, reached: &mut [usize], order: &mut Vec<usize>) {
+        if reached[start] == k {
+            return;
+        }
+        reached[start] = k;
+        let mut stack = vec![(start, 0)];
+        while let Some((row, next)) = stack.pop() {
+            let below = match self.position[row] {
+                NONE => 0..0,
+                j => self.lower.column(j),
+            };
+            match below.clone().skip(next).find(|&l| reached[self.lower.rows[l]] != k) {
+                Some(l) => {
+                    stack.push((row, l - below.start + 1));
+                    reached[self.lower.rows[l]] = k;
+                    stack.push((self.lower.rows[l], 0));
+                }
+                None => order.push(row),
+            }
+        }
+    }
+
+    fn choose_pivot(&mut self, k: usize, order: &[usize]) -> Result<(), SingularMatrix> {
+        let column = self.columns[k];
+        let mut best = (0.0, NONE);
+        for &row in order.iter().rev().filter(|&&row| self.position[row] == NONE) {
+            let size = self.work[row].abs();
+            if !size.is_finite() {
+                return Err(SingularMatrix { column });
+            }
+            if size > best.0 {
+                best = (size, row);
+            }
+        }
+        if best.0 <= SINGULAR {
+            return Err(SingularMatrix { column });
+        }
+        let diagonal = self.position[column] == NONE && self.work[column].abs() >= PREFER_DIAGONAL * best.0;
+        let row = if diagonal { column } else { best.1 };
+        self.position[row] = k;
+        self.pivot_row[k] = row;
+        self.inverse_pivot[k] = 1.0 / std::mem::take(&mut self.work[row]);
+        for &below in order.iter().rev().filter(|&&row| self.position[row] == NONE) {
+            self.lower.rows.push(below);
+            self.lower.values.push(std::mem::take(&mut self.work[below]) * self.inverse_pivot[k]);
+        }
+        self.lower.starts.push(self.lower.rows.len());
+        Ok(())
+    }
+
+    pub fn solve_block(&mut self, x: &mut [f64], width: usize) {
+        let n = self.columns.len();
+        self.block.resize(n * width, 0.0);
+        for (k, &row) in self.pivot_row.iter().enumerate() {
+            let scale = self.row_scale[row];
+            for (a, b) in self.block[k * width..(k + 1) * width].iter_mut().zip(&x[row * width..(row + 1) * width]) {
+                *a = b * scale;
+            }
+        }
+        for k in 0..n {
+            for l in self.lower.column(k) {
+                subtract_row(&mut self.block, self.lower.positions[l], k, width, self.lower.values[l]);
+            }
+        }
+        for k in (0..n).rev() {
+            for value in &mut self.block[k * width..(k + 1) * width] {
+                *value *= self.inverse_pivot[k];
+            }
+            for u in self.upper.column(k) {
+                subtract_row(&mut self.block, self.upper.rows[u], k, width, self.upper.values[u]);
+            }
+        }
+        for (k, &column) in self.columns.iter().enumerate() {
+            x[column * width..(column + 1) * width].copy_from_slice(&self.block[k * width..(k + 1) * width]);
+        }
+    }
+}
+
+/// Column order by approximate minimum degree of `A + A^T`; the natural order where none can be computed.
+fn minimum_degree(pattern: &SparsityPattern) -> Vec<usize> {
+    let n = pattern.column_count;
+    let symbolic = SymbolicSparseColMatRef::new_checked(n, n, &pattern.starts, None, &pattern.rows);
+    let mut order = vec![0usize; n];
+    let mut inverse = vec![0usize; n];
+    let mut memory = MemBuffer::new(amd::order_maybe_unsorted_scratch::<usize>(n, pattern.len()));
+    let stack = MemStack::new(&mut memory);
+    match amd::order_maybe_unsorted(&mut order, &mut inverse, symbolic, amd::Control::default(), stack) {
+        Ok(_) => order,
+        Err(_) => (0..n).collect(),
+    }
+}

@@ -1,0 +1,8 @@
+//! The integrators against analytic solutions and published references.
+
+mod orders;
+mod problems;
+mod references;
+mod scalar;
+mod sensitivities;
+mod system;

@@ -1,0 +1,133 @@
+//! Reference problems of the test set for initial value problems: digits reached, and the work it took.
+
+use crate::problems::*;
+use crate::system::{Equations, System};
+use ident::integrate::{MethodChoice, Options, Start, integrate};
+
+fn shared() -> std::path::PathBuf {
+    std::env::var_os("IDENT_SHARED").map_or_else(|| "../shared".into(), Into::into)
+}
+
+/// (end, values, whether the project's own digits are better than the published ones)
+fn reference(name: &str) -> Option<(f64, Vec<f64>)> {
+    let path = shared().join("data/ivp/reference.json");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        println!("skipped: {} not found", path.display());
+        return None;
+    };
+    let all: serde_json::Value = serde_json::from_str(&text).expect("reference.json is JSON");
+    let problem = &all["problems"][name];
+    let digits = if problem["own_quad"].is_array() { &problem["own_quad"] } else { &problem["published"] };
+    let values = digits.as_array().expect("values").iter().map(|v| v.as_str().expect("digits").parse().expect("number"));
+    Some((problem["t_end"].as_f64().expect("end"), values.collect()))
+}
+
+/// Number of correct digits of the worst component: -log10 of its relative error.
+fn digits(values: &[f64], reference: &[f64]) -> f64 {
+    let worst = values.iter().zip(reference).map(|(a, b)| ((a - b) / b).abs()).fold(0.0, f64::max);
+    -worst.log10()
+}
+
+struct Case<'a> {
+    name: &'a str,
+    method: MethodChoice,
+    /// Components compared.
+    compared: usize,
+    absolute_factor: f64,
+}
+
+impl Case<'_> {
+    /// One line per tolerance.
+    fn table<E: Equations>(&self, system: &mut System<E>, start: &Start, tolerances: &[f64]) -> Option<(String, f64)> {
+        let (end, expected) = reference(self.name)?;
+        let mut lines = String::new();
+        let mut last = 0.0;
+        for &tolerance in tolerances {
+            let options = Options {
+                relative_tolerance: tolerance,
+                absolute_factor: self.absolute_factor,
+                method: self.method,
+                ..Options::default()
+            };
+            let solution = integrate(system, start, &[end], &[], &options).unwrap_or_else(|f| panic!("{}: {f:?}", self.name));
+            last = digits(&solution.y[..self.compared], &expected);
+            let work = &solution.work;
+            lines += &format!(
+                "{tolerance:.0e}: {} digits, {} steps, {}+{} rejected, {} residuals, {} Jacobians, {} factorisations, {}\n",
+                last.floor(),
+                work.steps,
+                work.rejected_error,
+                work.rejected_newton,
+                work.residuals,
+                work.jacobians,
+                work.factorisations,
+                work.method
+            );
+            println!("{} {tolerance:.0e} {last:.2}", self.name);
+        }
+        Some((lines, last))
+    }
+}
+
+const TOLERANCES: [f64; 3] = [1e-4, 1e-7, 1e-10];
+
+fn bdf(name: &str, compared: usize) -> Case<'_> {
+    Case { name, method: MethodChoice::Bdf, compared, absolute_factor: 1e-3 }
+}
+
+#[test]
+fn robertson() {
+    let mut system = System::new(Robertson, &ROBERTSON);
+    let start = system.start(&[1.0, 0.0, 0.0]);
+    let Some((table, _last)) = bdf("robertson", 3).table(&mut system, &start, &TOLERANCES) else { return };
+    println!("{table}");
+}
+
+#[test]
+fn hires() {
+    let mut system = System::new(Hires, &[]);
+    let start = system.start(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0057]);
+    let Some((table, _last)) = bdf("hires", 8).table(&mut system, &start, &TOLERANCES) else { return };
+    println!("{table}");
+}
+
+#[test]
+fn pollution() {
+    let mut system = System::new(Pollution, &[]);
+    let start = system.start(&Pollution::initial());
+    let Some((table, _last)) = bdf("pollution", 20).table(&mut system, &start, &TOLERANCES) else { return };
+    println!("{table}");
+}
+
+#[test]
+fn van_der_pol() {
+    let mut system = System::new(VanDerPol, &[1e-6]);
+    let start = system.start(&[2.0, 0.0]);
+    let Some((table, _last)) = bdf("van_der_pol", 2).table(&mut system, &start, &TOLERANCES) else { return };
+    println!("{table}");
+    let automatic = Case { method: MethodChoice::Automatic, ..bdf("van_der_pol", 2) };
+    let Some((table, _last)) = automatic.table(&mut system, &start, &TOLERANCES) else { return };
+    println!("{table}");
+}
+
+#[test]
+fn pleiades() {
+    let mut system = System::new(Pleiades, &[]);
+    let start = system.start(&Pleiades::initial());
+    let case = Case { method: MethodChoice::Automatic, ..bdf("pleiades", 28) };
+    let Some((table, _last)) = case.table(&mut system, &start, &TOLERANCES) else { return };
+    println!("{table}");
+}
+
+#[test]
+fn transistor_amplifier() {
+    let mut system = System::new(TransistorAmplifier, &[]);
+    let start = Start {
+        time: 0.0,
+        y: TransistorAmplifier::Y.to_vec(),
+        y_prime: TransistorAmplifier::Y_PRIME.to_vec(),
+        sensitivity: Vec::new(),
+    };
+    let Some((table, _last)) = bdf("transistor_amplifier", 8).table(&mut system, &start, &TOLERANCES) else { return };
+    println!("{table}");
+}
