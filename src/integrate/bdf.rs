@@ -6,7 +6,7 @@
 
 use super::augmented::Augmented;
 use super::bdf_history::{History, MAXIMUM_ORDER};
-use super::newton::{Newton, NewtonFailure};
+use super::newton::{Newton, NewtonFailure, StepEnd};
 use super::norm::{ErrorNorm, Size};
 use super::problem::{Dynamics, FailureCause, PlannedStep};
 use super::stepper::{Limits, Refusal, first_not_finite};
@@ -32,6 +32,19 @@ pub(super) struct Bdf {
     /// Doubles the step and raises the order until the first sign of error.
     growing: bool,
     trouble: (FailureCause, Option<usize>),
+}
+
+/// The state part of the step being solved; a macro so that the borrows stay apart.
+macro_rules! step_end {
+    ($bdf:ident, $time:expr, $n:expr) => {
+        StepEnd {
+            time: $time,
+            leading: $bdf.history.leading,
+            y: &mut $bdf.z[..$n],
+            y_prime: &mut $bdf.z_prime[..$n],
+            correction: &mut $bdf.correction[..$n],
+        }
+    };
 }
 
 /// Estimated local errors of the order used, and of the order found best for the next step.
@@ -77,6 +90,7 @@ impl Bdf {
     }
 
     pub fn restart(&mut self, t: f64, z: &[f64], z_prime: &[f64], limits: &Limits, end: f64) {
+        self.norm.guess_column_scale(z_prime, end - t);
         self.norm.set_weights(z);
         let slope = self.norm.of(z_prime).norm;
         let span = FIRST_SHARE * (end - t);
@@ -136,11 +150,10 @@ impl Bdf {
         self.history.begin();
         self.history.predict(&mut self.z, &mut self.z_prime);
         self.correction.fill(0.0);
-        let refuse = |failure: NewtonFailure| Refusal { time: start, cause: failure.cause, component: failure.component };
+        let refuse =
+            |failure: NewtonFailure| Refusal { time: start, cause: failure.cause, component: failure.component };
         let n = system.n;
-        self.newton
-            .polish(system, &self.norm, end, self.history.leading, &mut self.z[..n], &mut self.z_prime[..n], &mut self.correction[..n])
-            .map_err(refuse)?;
+        self.newton.polish(system, &self.norm, &mut step_end!(self, end, n)).map_err(refuse)?;
         self.solve_sensitivities(system, end).map_err(refuse)?;
         system.work.steps += 1;
         self.history.accept(end, &self.correction);
@@ -156,10 +169,7 @@ impl Bdf {
         let n = system.n;
         self.history.predict(&mut self.z, &mut self.z_prime);
         self.correction.fill(0.0);
-        let (z, z_prime, correction) = (&mut self.z[..n], &mut self.z_prime[..n], &mut self.correction[..n]);
-        self.newton
-            .solve(system, &self.norm, end, self.history.leading, z, z_prime, correction)
-            .map_err(Rejection::Newton)?;
+        self.newton.solve(system, &self.norm, &mut step_end!(self, end, n)).map_err(Rejection::Newton)?;
         let state = self.norm.of_state(&self.correction);
         if self.history.error_constant * state.norm > 1.0 {
             self.trouble = (FailureCause::StepTooSmall, Some(state.component));
@@ -169,6 +179,9 @@ impl Bdf {
             return Ok((self.choose_order(state.norm, true), state));
         }
         self.solve_sensitivities(system, end).map_err(Rejection::Newton)?;
+        if self.norm.is_adaptive() {
+            self.norm.set_weights_between(&self.history.differences[0], &self.z);
+        }
         let size = self.norm.of(&self.correction);
         let choice = self.choose_order(size.norm, false);
         if self.history.error_constant * size.norm > 1.0 {
@@ -188,9 +201,9 @@ impl Bdf {
         if p == 0 {
             return Ok(());
         }
+        self.newton.settle(system, &self.norm, &mut step_end!(self, end, n))?;
         let (y, s) = self.z.split_at_mut(n);
         let (y_prime, s_prime) = self.z_prime.split_at_mut(n);
-        self.newton.renew_and_correct(system, end, c, y, y_prime, &mut self.correction[..n])?;
         let known = &mut self.scratch[n..];
         for ((v, s_prime), s) in known.iter_mut().zip(s_prime.iter()).zip(s.iter()) {
             *v = s_prime - c * s;
@@ -241,7 +254,12 @@ impl Bdf {
         choice
     }
 
-    fn accept<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, end: f64, choice: OrderChoice) -> PlannedStep {
+    fn accept<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &mut Augmented<D>,
+        end: f64,
+        choice: OrderChoice,
+    ) -> PlannedStep {
         system.work.steps += 1;
         let k = self.history.order;
         let planned = PlannedStep { end, order: k as u8 };

@@ -179,3 +179,102 @@ impl History {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps of unequal length, mildly growing and shrinking.
+    const STEPS: [f64; 8] = [0.1, 0.13, 0.12, 0.09, 0.11, 0.14, 0.1, 0.12];
+
+    /// A history of order `order` that has followed the exact solution.
+    fn following(order: usize, steps: &[f64], start: f64, exact: impl Fn(f64) -> f64, slope: f64) -> History {
+        let mut history = History::new(1);
+        history.restart(start, &[exact(start)], &[slope], steps[0]);
+        for (k, &step) in steps.iter().enumerate() {
+            history.order = order.min(k + 1);
+            history.resize(step);
+            history.begin();
+            let (mut z, mut z_prime) = ([0.0], [0.0]);
+            history.predict(&mut z, &mut z_prime);
+            let end = history.time + step;
+            history.accept(end, &[exact(end) - z[0]]);
+        }
+        history.order = order;
+        history
+    }
+
+    /// Largest error of predictor, derivative formula and interpolation on `t^degree`.
+    fn defect(order: usize, degree: i32) -> (f64, f64, f64) {
+        let exact = |t: f64| t.powi(degree);
+        let mut history = following(order, &STEPS, 0.3, exact, degree as f64 * 0.3f64.powi(degree - 1));
+        let inside = history.time - 0.4 * STEPS[7];
+        let mut z = [0.0];
+        history.interpolate(inside, &mut z);
+        let interpolation = (z[0] - exact(inside)).abs();
+        history.resize(0.105);
+        history.begin();
+        let mut z_prime = [0.0];
+        history.predict(&mut z, &mut z_prime);
+        let end = history.time + 0.105;
+        let derivative = z_prime[0] + history.leading * (exact(end) - z[0]);
+        ((z[0] - exact(end)).abs(), (derivative - degree as f64 * end.powi(degree - 1)).abs(), interpolation)
+    }
+
+    #[test]
+    fn order_k_is_exact_on_polynomials_of_degree_k_at_unequal_steps() {
+        for order in 1..=MAXIMUM_ORDER {
+            for degree in 1..=order as i32 {
+                let (predictor, derivative, interpolation) = defect(order, degree);
+                assert!(
+                    predictor < 1e-12 && derivative < 1e-11 && interpolation < 1e-12,
+                    "order {order}, degree {degree}"
+                );
+            }
+            let (predictor, derivative, interpolation) = defect(order, order as i32 + 1);
+            assert!(predictor > 1e-7 && derivative > 1e-7 && interpolation > 1e-9, "order {order} is not exact above");
+        }
+    }
+
+    #[test]
+    fn taking_a_step_back_restores_the_history() {
+        let mut history = following(4, &STEPS, 0.0, f64::cos, 0.0);
+        let before = (history.differences.clone(), history.spans);
+        history.resize(0.05);
+        history.begin();
+        history.withdraw();
+        for (a, b) in before.0[..=4].iter().zip(&history.differences) {
+            assert!((a[0] - b[0]).abs() < 1e-15);
+        }
+        for (a, b) in before.1[..4].iter().zip(&history.spans) {
+            assert!((a - b).abs() < 1e-15);
+        }
+    }
+
+    /// Error at t = 2 for y' = -y with equal steps, from exact values at the first ones.
+    fn decay_error(order: usize, count: usize) -> f64 {
+        let step = 2.0 / count as f64;
+        let exact = |t: f64| (-t).exp();
+        let mut history = following(order, &vec![step; order + 1], 0.0, exact, -1.0);
+        for _ in order + 1..count {
+            history.order = order;
+            history.resize(step);
+            history.begin();
+            let (mut z, mut z_prime) = ([0.0], [0.0]);
+            history.predict(&mut z, &mut z_prime);
+            // predicted' + leading e = -(predicted + e)
+            let correction = -(z_prime[0] + z[0]) / (history.leading + 1.0);
+            let end = history.time + step;
+            history.accept(end, &[correction]);
+        }
+        (history.differences[0][0] - exact(history.time)).abs()
+    }
+
+    #[test]
+    fn every_order_converges_with_its_power() {
+        for order in 1..=MAXIMUM_ORDER {
+            let observed = (decay_error(order, 40) / decay_error(order, 80)).log2();
+            assert!((observed - order as f64).abs() < 0.3, "order {order}: {observed}");
+        }
+    }
+}

@@ -69,12 +69,7 @@ fn segments(start: f64, times: &[f64], breakpoints: &[f64]) -> Vec<(f64, bool)> 
     segments
 }
 
-fn check<D: Dynamics + ?Sized>(
-    dynamics: &D,
-    start: &Start,
-    times: &[f64],
-    options: &Options,
-) -> Result<(), Failure> {
+fn check<D: Dynamics + ?Sized>(dynamics: &D, start: &Start, times: &[f64], options: &Options) -> Result<(), Failure> {
     let (n, p) = (dynamics.dimension(), dynamics.parameter_count());
     let positive = |values: &[f64]| values.iter().position(|v| !(*v > 0.0 && v.is_finite()));
     if let Some(component) = positive(dynamics.scale()) {
@@ -98,11 +93,13 @@ fn check<D: Dynamics + ?Sized>(
         return Err(invalid(start.time, None));
     }
     match start.y.iter().position(|v| !v.is_finite()) {
-        Some(component) => Err(Failure { cause: FailureCause::InconsistentStart, ..invalid(start.time, Some(component)) }),
+        Some(component) => {
+            Err(Failure { cause: FailureCause::InconsistentStart, ..invalid(start.time, Some(component)) })
+        }
         None => Ok(()),
     }
 }
 
 fn invalid(time: f64, component: Option<usize>) -> Failure {
-    Failure { time, cause: FailureCause::InvalidRequest, component, work: Work::default() }
+    Failure { time, cause: FailureCause::InvalidRequest, component, work: Box::default() }
 }

@@ -15,8 +15,14 @@ const NEGLIGIBLE: f64 = 1e-4 * TOLERANCE;
 const SLOWEST_RATE: f64 = 0.9;
 /// Assumed value of rate / (1 - rate) with a new matrix.
 const CAUTIOUS_RATE: f64 = 20.0;
+/// Assumed value of it when the leading coefficient has changed since the last step: what was learnt of the rate then
+/// says nothing about the old matrix now.
+const UNKNOWN_RATE: f64 = 100.0;
 /// The matrix is renewed when its leading coefficient and the present one differ by more than this factor.
 const LARGEST_RATIO: f64 = 1.0 / 0.6;
+/// Relative correction below which the matrix counts as that of the solution, and the most renewals to get there.
+const SETTLED: f64 = 1e-9;
+const SETTLE_ITERATIONS: usize = 3;
 /// Iterations when the equations are to be solved to rounding.
 const POLISH_ITERATIONS: usize = 12;
 /// Correction, in the error norm, that counts as rounding.
@@ -28,11 +34,45 @@ pub(super) struct NewtonFailure {
     pub component: Option<usize>,
 }
 
+/// The end of a step while it is being solved.
+pub(super) struct StepEnd<'z> {
+    pub time: f64,
+    /// `dy'/dy` within the step.
+    pub leading: f64,
+    pub y: &'z mut [f64],
+    pub y_prime: &'z mut [f64],
+    /// `y` minus its prediction.
+    pub correction: &'z mut [f64],
+}
+
+impl StepEnd<'_> {
+    fn correct(&mut self, delta: &[f64]) {
+        let states = self.y.iter_mut().zip(self.y_prime.iter_mut());
+        for (((y, y_prime), e), d) in states.zip(self.correction.iter_mut()).zip(delta) {
+            *y += d;
+            *y_prime += self.leading * d;
+            *e += d;
+        }
+    }
+
+    /// Back to the prediction.
+    fn reset(&mut self) {
+        let states = self.y.iter_mut().zip(self.y_prime.iter_mut());
+        for ((y, y_prime), e) in states.zip(self.correction.iter_mut()) {
+            *y -= *e;
+            *y_prime -= self.leading * *e;
+            *e = 0.0;
+        }
+    }
+}
+
 pub(super) struct Newton {
     factorisation: Factorisation,
     /// Leading coefficient the factors were made for.
     leading: Option<f64>,
     rate_factor: f64,
+    /// Leading coefficient of the last step solved.
+    last_leading: f64,
     delta: Vec<f64>,
 }
 
@@ -42,6 +82,7 @@ impl Newton {
             factorisation: Factorisation::new(system.dynamics.pattern()),
             leading: None,
             rate_factor: CAUTIOUS_RATE,
+            last_leading: 0.0,
             delta: vec![0.0; system.n],
         }
     }
@@ -54,19 +95,12 @@ impl Newton {
     fn serves(&self, c: f64) -> bool {
         self.leading.is_some_and(|leading| {
             let ratio = c / leading;
-            ratio <= LARGEST_RATIO && ratio >= 1.0 / LARGEST_RATIO
+            (1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&ratio)
         })
     }
 
-    fn renew<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        t: f64,
-        y: &[f64],
-        y_prime: &[f64],
-        c: f64,
-    ) -> Result<(), NewtonFailure> {
-        system.linearise(t, y, y_prime, c);
+    fn renew<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, end: &StepEnd) -> Result<(), NewtonFailure> {
+        system.linearise(end.time, end.y, end.y_prime, end.leading);
         system.work.factorisations += 1;
         self.leading = None;
         self.factorisation.factor(&system.jacobian).map_err(|singular| match first_not_finite(&system.jacobian) {
@@ -75,39 +109,34 @@ impl Newton {
             }
             None => NewtonFailure { cause: FailureCause::SingularMatrix, component: Some(singular.column) },
         })?;
-        self.leading = Some(c);
+        self.leading = Some(end.leading);
         self.rate_factor = CAUTIOUS_RATE;
         Ok(())
     }
 
-    /// Solves from the prediction in `y`, `y_prime` and leaves the solution there; `correction` (zero on entry)
-    /// collects the difference.
+    /// Solves from the prediction in `end` and leaves the solution there.
     pub fn solve<D: Dynamics + ?Sized>(
         &mut self,
         system: &mut Augmented<D>,
         norm: &ErrorNorm,
-        t: f64,
-        c: f64,
-        y: &mut [f64],
-        y_prime: &mut [f64],
-        correction: &mut [f64],
+        end: &mut StepEnd,
     ) -> Result<(), NewtonFailure> {
-        let mut new = !self.serves(c);
+        let mut new = !self.serves(end.leading);
+        if end.leading != self.last_leading {
+            self.rate_factor = UNKNOWN_RATE;
+            self.last_leading = end.leading;
+        }
         loop {
             if new {
-                self.renew(system, t, y, y_prime, c)?;
+                self.renew(system, end)?;
             }
-            let result = self.iterate(system, norm, t, c, y, y_prime, correction);
+            let result = self.iterate(system, norm, end);
             match result {
                 Err(_) if !new => {
                     new = true;
-                    for ((y, y_prime), e) in y.iter_mut().zip(y_prime.iter_mut()).zip(correction.iter_mut()) {
-                        *y -= *e;
-                        *y_prime -= c * *e;
-                        *e = 0.0;
-                    }
+                    end.reset();
                     // A huge excursion does not come back exactly; NaN does not come back at all.
-                    if first_not_finite(y).is_some() {
+                    if first_not_finite(end.y).is_some() {
                         self.forget();
                         return result;
                     }
@@ -121,17 +150,13 @@ impl Newton {
         &mut self,
         system: &mut Augmented<D>,
         norm: &ErrorNorm,
-        t: f64,
-        c: f64,
-        y: &mut [f64],
-        y_prime: &mut [f64],
-        correction: &mut [f64],
+        end: &mut StepEnd,
     ) -> Result<(), NewtonFailure> {
         let mut first = 0.0;
         for iteration in 0..MAXIMUM_ITERATIONS {
-            self.find_delta(system, t, y, y_prime, c)?;
+            self.find_delta(system, end)?;
             let size = norm.of_correction(&self.delta);
-            self.apply(c, y, y_prime, correction);
+            end.correct(&self.delta);
             if iteration == 0 {
                 first = size;
                 if size <= NEGLIGIBLE {
@@ -139,7 +164,7 @@ impl Newton {
                 }
             } else {
                 let rate = (size / first).powf(1.0 / iteration as f64);
-                if !(rate <= SLOWEST_RATE) {
+                if rate.is_nan() || rate > SLOWEST_RATE {
                     break;
                 }
                 self.rate_factor = rate / (1.0 - rate);
@@ -155,29 +180,18 @@ impl Newton {
     fn find_delta<D: Dynamics + ?Sized>(
         &mut self,
         system: &mut Augmented<D>,
-        t: f64,
-        y: &[f64],
-        y_prime: &[f64],
-        c: f64,
+        end: &StepEnd,
     ) -> Result<(), NewtonFailure> {
         system.work.newton_iterations += 1;
-        system.residual(t, y, y_prime, &mut self.delta);
+        system.residual(end.time, end.y, end.y_prime, &mut self.delta);
         if let Some(component) = first_not_finite(&self.delta) {
             return Err(NewtonFailure { cause: FailureCause::NotFinite, component: Some(component) });
         }
         self.factorisation.solve(&mut self.delta);
-        let ratio = self.leading.map_or(1.0, |leading| c / leading);
+        let ratio = self.leading.map_or(1.0, |leading| end.leading / leading);
         let factor = -2.0 / (1.0 + ratio);
         self.delta.iter_mut().for_each(|d| *d *= factor);
         Ok(())
-    }
-
-    fn apply(&self, c: f64, y: &mut [f64], y_prime: &mut [f64], correction: &mut [f64]) {
-        for (((y, y_prime), e), d) in y.iter_mut().zip(y_prime).zip(correction).zip(&self.delta) {
-            *y += d;
-            *y_prime += c * d;
-            *e += d;
-        }
     }
 
     fn largest_delta(&self, norm: &ErrorNorm) -> Option<usize> {
@@ -185,20 +199,31 @@ impl Newton {
         (0..self.delta.len()).max_by(|&a, &b| scaled(a).total_cmp(&scaled(b)))
     }
 
-    /// Renews the matrix at a solved step and applies one further correction with it, which leaves an error of the
-    /// square of the tolerance: the point at which sensitivities are exact.
-    pub fn renew_and_correct<D: Dynamics + ?Sized>(
+    /// Renews the matrix at a solved step and corrects with it until the matrix is that of the solution: the point at
+    /// which sensitivities are exact derivatives of the discrete solution.
+    pub fn settle<D: Dynamics + ?Sized>(
         &mut self,
         system: &mut Augmented<D>,
-        t: f64,
-        c: f64,
-        y: &mut [f64],
-        y_prime: &mut [f64],
-        correction: &mut [f64],
+        norm: &ErrorNorm,
+        end: &mut StepEnd,
     ) -> Result<(), NewtonFailure> {
-        self.renew(system, t, y, y_prime, c)?;
-        self.find_delta(system, t, y, y_prime, c)?;
-        self.apply(c, y, y_prime, correction);
+        for _ in 0..SETTLE_ITERATIONS {
+            self.renew_and_correct(system, end)?;
+            if norm.of_correction(&self.delta) * norm.relative() <= SETTLED {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn renew_and_correct<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &mut Augmented<D>,
+        end: &mut StepEnd,
+    ) -> Result<(), NewtonFailure> {
+        self.renew(system, end)?;
+        self.find_delta(system, end)?;
+        end.correct(&self.delta);
         Ok(())
     }
 
@@ -207,15 +232,11 @@ impl Newton {
         &mut self,
         system: &mut Augmented<D>,
         norm: &ErrorNorm,
-        t: f64,
-        c: f64,
-        y: &mut [f64],
-        y_prime: &mut [f64],
-        correction: &mut [f64],
+        end: &mut StepEnd,
     ) -> Result<(), NewtonFailure> {
         let mut last = f64::INFINITY;
         for _ in 0..POLISH_ITERATIONS {
-            self.renew_and_correct(system, t, c, y, y_prime, correction)?;
+            self.renew_and_correct(system, end)?;
             let size = norm.of_correction(&self.delta);
             // Where rounding ends the descent before the bound, it has been reached all the same.
             if size <= POLISHED || (size <= 1e-3 && size >= 0.5 * last) {

@@ -2,6 +2,8 @@
 
 use super::problem::{Dynamics, Options};
 
+const GUESS_SHARE: f64 = 0.01;
+
 /// Weights of the error control: component i of the state may err by `relative |y_i| + absolute_i`, the sensitivity of
 /// component i to parameter j by `relative |S_ij| + absolute_i / parameter_scale_j`.
 ///
@@ -63,6 +65,20 @@ impl ErrorNorm {
         }
     }
 
+    /// Where the scale of the columns is not known, a first guess of it from their slopes: their size after a hundredth
+    /// of the span.
+    pub fn guess_column_scale(&mut self, z_prime: &[f64], span: f64) {
+        if self.adaptive && self.p > 0 {
+            let grown: Vec<f64> = z_prime[self.n..].iter().map(|v| GUESS_SHARE * span * v).collect();
+            self.grow_column_scale(&grown);
+        }
+    }
+
+    /// Whether the weights depend on the solution at the end of the step.
+    pub fn is_adaptive(&self) -> bool {
+        self.adaptive && self.p > 0
+    }
+
     /// Sets the weights for values about `z`.
     pub fn set_weights(&mut self, z: &[f64]) {
         self.set_weights_between(z, z);
@@ -97,6 +113,10 @@ impl ErrorNorm {
         }
     }
 
+    pub fn relative(&self) -> f64 {
+        self.relative
+    }
+
     pub fn state_weights(&self) -> &[f64] {
         &self.inverse_weight[..self.n]
     }
@@ -104,9 +124,10 @@ impl ErrorNorm {
     /// Size of the state part of an error, algebraic components left out.
     pub fn of_state(&self, error: &[f64]) -> Size {
         let (mut sum, mut largest, mut component) = (0.0, 0.0, 0);
-        for i in 0..self.n {
-            let scaled = error[i] * self.inverse_weight[i];
-            let square = if self.differential[i] { scaled * scaled } else { 0.0 };
+        let elements = error.iter().zip(&self.inverse_weight).zip(&self.differential);
+        for (i, ((e, w), differential)) in elements.enumerate() {
+            let scaled = e * w;
+            let square = if *differential { scaled * scaled } else { 0.0 };
             sum += square;
             if square > largest {
                 largest = square;

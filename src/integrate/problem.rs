@@ -188,7 +188,7 @@ pub struct Failure {
     pub cause: FailureCause,
     /// The component to blame, where one can be named.
     pub component: Option<usize>,
-    pub work: Work,
+    pub work: Box<Work>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -140,9 +140,7 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
 
     fn start_method(&mut self, end: f64) -> Result<(), Refusal> {
         match self.method {
-            Method::Explicit => {
-                self.runge_kutta.restart(&mut self.system, self.time, &self.z, &self.limits, end)
-            }
+            Method::Explicit => self.runge_kutta.restart(&mut self.system, self.time, &self.z, &self.limits, end),
             Method::Bdf => {
                 self.bdf.restart(self.time, &self.z, &self.z_prime, &self.limits, end);
                 Ok(())

@@ -94,6 +94,7 @@ impl RungeKutta {
 
     fn first_step<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, span: f64) -> f64 {
         let [second, .., first] = &mut self.stages;
+        self.norm.guess_column_scale(first, span);
         self.norm.set_weights(&self.current);
         let size = self.norm.of_state(&self.current).norm;
         let slope = self.norm.of(first).norm;

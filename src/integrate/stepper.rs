@@ -18,7 +18,7 @@ pub(super) struct Refusal {
 
 impl Refusal {
     pub fn with_work(self, work: Work) -> Failure {
-        Failure { time: self.time, cause: self.cause, component: self.component, work }
+        Failure { time: self.time, cause: self.cause, component: self.component, work: Box::new(work) }
     }
 }
 

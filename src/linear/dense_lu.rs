@@ -22,9 +22,18 @@ impl DenseLu {
     pub fn new(pattern: &SparsityPattern) -> Self {
         let n = pattern.column_count;
         let places = (0..n)
-            .flat_map(|column| pattern.rows[pattern.starts[column]..pattern.starts[column + 1]].iter().map(move |row| row * n + column))
+            .flat_map(|column| {
+                pattern.rows[pattern.starts[column]..pattern.starts[column + 1]].iter().map(move |row| row * n + column)
+            })
             .collect();
-        Self { n, places, lu: vec![0.0; n * n], row_scale: vec![0.0; n], inverse_pivot: vec![0.0; n], exchanges: vec![0; n] }
+        Self {
+            n,
+            places,
+            lu: vec![0.0; n * n],
+            row_scale: vec![0.0; n],
+            inverse_pivot: vec![0.0; n],
+            exchanges: vec![0; n],
+        }
     }
 
     pub fn factor(&mut self, values: &[f64]) -> Result<(), SingularMatrix> {

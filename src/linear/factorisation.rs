@@ -34,11 +34,8 @@ impl Factorisation {
     pub fn new(pattern: &SparsityPattern) -> Self {
         let n = pattern.column_count;
         let dense = n <= DENSE_DIMENSION || pattern.len() as f64 > DENSE_FILL * (n * n) as f64;
-        let method = if dense {
-            Method::Dense(DenseLu::new(pattern))
-        } else {
-            Method::Sparse(Box::new(SparseLu::new(pattern)))
-        };
+        let method =
+            if dense { Method::Dense(DenseLu::new(pattern)) } else { Method::Sparse(Box::new(SparseLu::new(pattern))) };
         Self { method, dimension: n }
     }
 
@@ -128,11 +125,9 @@ mod tests {
             let pattern = band(n, &[-7, -1, 0, 1, 2, 11]);
             let mut values: Vec<f64> = (0..pattern.len()).map(|k| seed[k % seed.len()]).collect();
             for column in 0..n {
-                for k in pattern.starts[column]..pattern.starts[column + 1] {
-                    if pattern.rows[k] == column {
-                        values[k] += 4.0;
-                    }
-                }
+                let entries = pattern.starts[column]..pattern.starts[column + 1];
+                let diagonal = pattern.rows[entries.clone()].iter().position(|&row| row == column).unwrap();
+                values[entries][diagonal] += 4.0;
             }
             check(&pattern, &values, width, 1e-9);
         }

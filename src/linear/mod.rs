@@ -3,8 +3,8 @@
 mod dense_lu;
 mod factorisation;
 mod pattern;
-mod svd;
 mod sparse_lu;
+mod svd;
 
 pub use factorisation::{Factorisation, SingularMatrix};
 pub use pattern::SparsityPattern;

@@ -123,12 +123,12 @@ impl SparseLu {
         true
     }
 
-    /// Adds scaled column k of the matrix to the work column.
+    /// Puts scaled column k of the matrix into the work column.
     fn scatter(&mut self, k: usize, values: &[f64]) {
         let column = self.columns[k];
-        for entry in self.pattern.starts[column]..self.pattern.starts[column + 1] {
-            let row = self.pattern.rows[entry];
-            self.work[row] = values[entry] * self.row_scale[row];
+        let entries = self.pattern.starts[column]..self.pattern.starts[column + 1];
+        for (&row, value) in self.pattern.rows[entries.clone()].iter().zip(&values[entries]) {
+            self.work[row] = value * self.row_scale[row];
         }
     }
 

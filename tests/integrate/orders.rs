@@ -1,1 +1,92 @@
 //! Orders of convergence and exactness.
+
+use crate::problems::*;
+use crate::scalar::Scalar;
+use crate::system::{Equations, System};
+use ident::integrate::{Dynamics, MethodChoice, Options, Plan, PlannedStep, Start, integrate};
+use std::sync::Arc;
+
+fn errors<E: Equations>(system: &mut System<E>, start: &Start, end: f64, exact: f64, options: &[Options]) -> Vec<f64> {
+    options.iter().map(|o| (integrate(system, start, &[end], &[], o).unwrap().y[0] - exact).abs()).collect()
+}
+
+#[test]
+fn runge_kutta_converges_with_order_5() {
+    let mut system = System::new(Oscillator, &[3.0, 0.1]);
+    let start = system.start(&[1.0, 0.0]);
+    let options = [20, 40].map(|count| {
+        let steps = (1..=count).map(|i| PlannedStep { end: 2.0 * i as f64 / count as f64, order: 0 }).collect();
+        Options { follow_plan: Some(Arc::new(Plan { steps })), ..Options::default() }
+    });
+    let found = errors(&mut system, &start, 2.0, Oscillator::exact(2.0, 3.0, 0.1), &options);
+    let observed = (found[0] / found[1]).log2();
+    assert!((observed - 5.0).abs() < 0.3, "{observed}");
+}
+
+#[test]
+fn interpolation_between_steps_keeps_the_tolerance() {
+    for (method, bound) in [(MethodChoice::RungeKutta, 1e-5), (MethodChoice::Bdf, 1e-4)] {
+        let mut system = System::new(Oscillator, &[3.0, 0.1]);
+        let start = system.start(&[1.0, 0.0]);
+        let times: Vec<f64> = (0..=5000).map(|i| i as f64 * 1e-3).collect();
+        let options = Options { method, ..Options::default() };
+        let solution = integrate(&mut system, &start, &times, &[], &options).unwrap();
+        let coarse = integrate(&mut system, &start, &[5.0], &[], &options).unwrap();
+        assert_eq!(solution.work.steps, coarse.work.steps, "requested times do not shorten steps");
+        let worst = times.iter().enumerate().map(|(k, &t)| (solution.y[2 * k] - Oscillator::exact(t, 3.0, 0.1)).abs());
+        let worst = worst.fold(0.0, f64::max);
+        println!("{method:?} {worst:e}");
+        assert!(worst < bound, "{method:?}: {worst:e}");
+    }
+}
+
+/// `x' = -x + u(t)` with a jump of u from 0 to 1 at t = 1; right-continuous.
+struct Jump;
+
+impl Equations for Jump {
+    fn dimension(&self) -> usize {
+        1
+    }
+
+    fn rates<S: Scalar>(&self, t: f64, y: &[S], _theta: &[S]) -> Option<Vec<S>> {
+        Some(vec![S::from(if t >= 1.0 { 1.0 } else { 0.0 }) - y[0]])
+    }
+}
+
+#[test]
+fn breakpoints_are_met_exactly_and_from_both_sides() {
+    for method in [MethodChoice::RungeKutta, MethodChoice::Bdf] {
+        let mut system = System::new(Jump, &[]);
+        let start = system.start(&[0.5]);
+        let options = Options { method, relative_tolerance: 1e-8, ..Options::default() };
+        let solution = integrate(&mut system, &start, &[0.5, 1.0, 2.0], &[1.0], &options).unwrap();
+        let at_jump = 0.5 * (-1.0f64).exp();
+        let exact = [0.5 * (-0.5f64).exp(), at_jump, 1.0 + (at_jump - 1.0) * (-1.0f64).exp()];
+        for (y, exact) in solution.y.iter().zip(exact) {
+            assert!((y - exact).abs() < 1e-6, "{method:?}: {y} {exact}");
+        }
+        let blind = integrate(&mut system, &start, &[2.0], &[], &options).unwrap();
+        assert!(solution.work.rejected_error + 5 < blind.work.rejected_error, "{method:?}: no step runs into the jump");
+    }
+}
+
+#[test]
+fn index_2_pendulum_stays_on_its_circle() {
+    let mut system = System::new(Pendulum, &[9.81]);
+    let start = Start {
+        time: 0.0,
+        y: vec![1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        y_prime: vec![0.0, 0.0, 0.0, -9.81, 0.0, 0.0],
+        sensitivity: vec![0.0; 6],
+    };
+    let times: Vec<f64> = (1..=100).map(|i| 0.1 * i as f64).collect();
+    let options = Options { relative_tolerance: 1e-7, ..Options::default() };
+    let solution = integrate(&mut system, &start, &times, &[], &options).unwrap();
+    for y in solution.y.chunks_exact(6) {
+        assert!((y[0].hypot(y[1]) - 1.0).abs() < 1e-7, "position level");
+        assert!((y[0] * y[2] + y[1] * y[3]).abs() < 1e-6, "velocity level");
+        let energy = 0.5 * (y[2] * y[2] + y[3] * y[3]) + 9.81 * y[1];
+        assert!(energy.abs() < 1e-3, "energy {energy:e}");
+    }
+    assert_eq!(system.differential()[4..], [false, false]);
+}

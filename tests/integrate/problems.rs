@@ -162,7 +162,8 @@ impl Equations for Pollution {
 
     fn scale(&self) -> Vec<f64> {
         vec![
-            1e-1, 1e-1, 1e-8, 1e-2, 1e-6, 1e-6, 1e-1, 1e-1, 1e-2, 1e-7, 1e-7, 1e-3, 1e-3, 1e-4, 1e-2, 1e-17, 1e-2, 1e-4, 1e-5, 1e-4,
+            1e-1, 1e-1, 1e-8, 1e-2, 1e-6, 1e-6, 1e-1, 1e-1, 1e-2, 1e-7, 1e-7, 1e-3, 1e-3, 1e-4, 1e-2, 1e-17, 1e-2,
+            1e-4, 1e-5, 1e-4,
         ]
     }
 
@@ -234,16 +235,8 @@ pub struct TransistorAmplifier;
 
 impl TransistorAmplifier {
     pub const Y: [f64; 8] = [0.0, 3.0, 3.0, 6.0, 3.0, 3.0, 6.0, 0.0];
-    pub const Y_PRIME: [f64; 8] = [
-        51.338775,
-        51.338775,
-        -166.666667,
-        -24.9757667,
-        -24.9757667,
-        -83.333333,
-        -10.00564453,
-        -10.00564453,
-    ];
+    pub const Y_PRIME: [f64; 8] =
+        [51.338775, 51.338775, -166.666667, -24.9757667, -24.9757667, -83.333333, -10.00564453, -10.00564453];
 }
 
 impl Equations for TransistorAmplifier {

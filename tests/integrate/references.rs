@@ -18,7 +18,8 @@ fn reference(name: &str) -> Option<(f64, Vec<f64>)> {
     let all: serde_json::Value = serde_json::from_str(&text).expect("reference.json is JSON");
     let problem = &all["problems"][name];
     let digits = if problem["own_quad"].is_array() { &problem["own_quad"] } else { &problem["published"] };
-    let values = digits.as_array().expect("values").iter().map(|v| v.as_str().expect("digits").parse().expect("number"));
+    let values =
+        digits.as_array().expect("values").iter().map(|v| v.as_str().expect("digits").parse().expect("number"));
     Some((problem["t_end"].as_f64().expect("end"), values.collect()))
 }
 
@@ -49,7 +50,8 @@ impl Case<'_> {
                 method: self.method,
                 ..Options::default()
             };
-            let solution = integrate(system, start, &[end], &[], &options).unwrap_or_else(|f| panic!("{}: {f:?}", self.name));
+            let solution =
+                integrate(system, start, &[end], &[], &options).unwrap_or_else(|f| panic!("{}: {f:?}", self.name));
             last = digits(&solution.y[..self.compared], &expected);
             let work = &solution.work;
             lines += &format!(
@@ -79,35 +81,40 @@ fn bdf(name: &str, compared: usize) -> Case<'_> {
 fn robertson() {
     let mut system = System::new(Robertson, &ROBERTSON);
     let start = system.start(&[1.0, 0.0, 0.0]);
-    let Some((table, _last)) = bdf("robertson", 3).table(&mut system, &start, &TOLERANCES) else { return };
-    println!("{table}");
+    let Some((table, last)) = bdf("robertson", 3).table(&mut system, &start, &TOLERANCES) else { return };
+    insta::assert_snapshot!(table);
+    assert!(last >= 8.0, "{last} digits");
 }
 
 #[test]
 fn hires() {
     let mut system = System::new(Hires, &[]);
     let start = system.start(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0057]);
-    let Some((table, _last)) = bdf("hires", 8).table(&mut system, &start, &TOLERANCES) else { return };
-    println!("{table}");
+    let Some((table, last)) = bdf("hires", 8).table(&mut system, &start, &TOLERANCES) else { return };
+    insta::assert_snapshot!(table);
+    assert!(last >= 8.0, "{last} digits");
 }
 
 #[test]
 fn pollution() {
     let mut system = System::new(Pollution, &[]);
     let start = system.start(&Pollution::initial());
-    let Some((table, _last)) = bdf("pollution", 20).table(&mut system, &start, &TOLERANCES) else { return };
-    println!("{table}");
+    let Some((table, last)) = bdf("pollution", 20).table(&mut system, &start, &TOLERANCES) else { return };
+    insta::assert_snapshot!(table);
+    assert!(last >= 8.0, "{last} digits");
 }
 
 #[test]
 fn van_der_pol() {
     let mut system = System::new(VanDerPol, &[1e-6]);
     let start = system.start(&[2.0, 0.0]);
-    let Some((table, _last)) = bdf("van_der_pol", 2).table(&mut system, &start, &TOLERANCES) else { return };
-    println!("{table}");
+    let Some((table, last)) = bdf("van_der_pol", 2).table(&mut system, &start, &TOLERANCES) else { return };
+    insta::assert_snapshot!(table);
+    assert!(last >= 8.0, "{last} digits");
     let automatic = Case { method: MethodChoice::Automatic, ..bdf("van_der_pol", 2) };
-    let Some((table, _last)) = automatic.table(&mut system, &start, &TOLERANCES) else { return };
-    println!("{table}");
+    let Some((table, last)) = automatic.table(&mut system, &start, &TOLERANCES) else { return };
+    insta::assert_snapshot!(table);
+    assert!(last >= 8.0, "{last} digits");
 }
 
 #[test]
@@ -115,8 +122,9 @@ fn pleiades() {
     let mut system = System::new(Pleiades, &[]);
     let start = system.start(&Pleiades::initial());
     let case = Case { method: MethodChoice::Automatic, ..bdf("pleiades", 28) };
-    let Some((table, _last)) = case.table(&mut system, &start, &TOLERANCES) else { return };
-    println!("{table}");
+    let Some((table, last)) = case.table(&mut system, &start, &TOLERANCES) else { return };
+    insta::assert_snapshot!(table);
+    assert!(last >= 8.0, "{last} digits");
 }
 
 #[test]
@@ -128,6 +136,9 @@ fn transistor_amplifier() {
         y_prime: TransistorAmplifier::Y_PRIME.to_vec(),
         sensitivity: Vec::new(),
     };
-    let Some((table, _last)) = bdf("transistor_amplifier", 8).table(&mut system, &start, &TOLERANCES) else { return };
-    println!("{table}");
+    let Some((table, last)) = bdf("transistor_amplifier", 8).table(&mut system, &start, &[1e-4, 1e-6, 1e-8]) else {
+        return;
+    };
+    insta::assert_snapshot!(table);
+    assert!(last >= 6.0, "{last} digits");
 }

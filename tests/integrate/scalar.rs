@@ -3,7 +3,13 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub trait Scalar:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self> + From<f64>
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + From<f64>
 {
     fn sin(self) -> Self;
     fn cos(self) -> Self;
