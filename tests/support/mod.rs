@@ -5,6 +5,7 @@
 
 #![allow(dead_code, reason = "each test binary uses another part")]
 
+pub mod judge;
 pub mod strength;
 
 use crate::truth::effect::Effect;
