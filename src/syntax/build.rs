@@ -482,7 +482,10 @@ impl<'a> Builder<'a> {
         let span = self.span(&inner);
         let mut inside = Parts::of(inner);
         match rule {
-            Rule::parameters => self.declared_list(inside, documentation, &mut into.parameters)?,
+            Rule::parameters => {
+                self.declared_list(inside, documentation, &mut into.parameters)?;
+                into.values.extend(into.parameters.last_mut().and_then(|last| self.value_below(last)));
+            }
             Rule::amplitudes => self.declared_list(inside, documentation, &mut into.amplitudes)?,
             Rule::shapes => self.declared_list(inside, documentation, &mut into.shapes)?,
             Rule::binding => {
@@ -506,6 +509,15 @@ impl<'a> Builder<'a> {
             into.push(self.declared(pair, std::mem::take(&mut above))?);
         }
         Some(())
+    }
+
+    /// A default stands on its parameter's line. `= ..` on a line below is the law's value, which the grammar, blind to
+    /// line ends, has read as the default of the last parameter.
+    fn value_below(&self, last: &mut Declared) -> Option<Expression> {
+        let end = last.kind.as_ref().map_or(last.name.span.end, |kind| kind.span.end) as usize;
+        let start = last.default.as_ref()?.span.start as usize;
+        let between = self.text.get(end - self.offset..start - self.offset)?;
+        if between.contains('\n') { last.default.take() } else { None }
     }
 
     fn declared(&mut self, pair: Pair<'_, Rule>, above: String) -> Built<Declared> {
