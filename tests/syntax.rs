@@ -42,3 +42,215 @@ fn printing_and_reading_again_gives_the_same_tree() {
         assert_eq!(printed, print(&again));
     }
 }
+
+/// The findings of every case, next to its text. `INSTA_UPDATE=always` writes them anew; read them before you commit.
+#[test]
+fn errors_are_told_in_an_engineers_words() {
+    for path in study_files("tests/cases/syntax") {
+        let text = fs::read_to_string(&path).expect("readable case");
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut sources = Sources::new();
+        let file = sources.add(&name, &text);
+        let (tree, diagnostics) = parse(file, &text);
+        let code = name.split('_').next().unwrap_or_default();
+        assert!(diagnostics.iter().any(|finding| finding.code.text == code), "{name} does not show its code");
+        let kept: Vec<String> = tree.items.iter().map(|item| ident::syntax::print_item(item)).collect();
+        let shown =
+            format!("{}\n---- read nevertheless ----\n{}", render(&diagnostics, &sources, false), kept.concat());
+        let mut settings = insta::Settings::clone_current();
+        settings.set_snapshot_path("cases/syntax");
+        settings.set_prepend_module_to_snapshot(false);
+        settings.set_omit_expression(true);
+        settings.bind(|| insta::assert_snapshot!(name.trim_end_matches(".ident"), shown));
+    }
+}
+
+mod soup {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Tokens of the language and some that are foreign to it.
+    fn token() -> impl Strategy<Value = String> {
+        let words = [
+            "study",
+            "use",
+            "gravity",
+            "constant",
+            "input",
+            "body",
+            "joint",
+            "force",
+            "actuator",
+            "signal",
+            "effect",
+            "measure",
+            "group",
+            "experiment",
+            "identify",
+            "filter",
+            "solver",
+            "variant",
+            "law",
+            "add",
+            "remove",
+            "replace",
+            "param",
+            "let",
+            "state",
+            "amplitude",
+            "shape",
+            "adds",
+            "replaces",
+            "in",
+            "from",
+            "prior",
+            "on",
+            "along",
+            "of",
+            "at",
+            "any",
+            "where",
+            "by",
+            "if",
+            "then",
+            "else",
+            "and",
+            "or",
+            "lowpass",
+            "butterworth",
+            "pass",
+            "stop",
+            "zero_phase",
+            "remove_mean",
+            "one_sided",
+            "neutral",
+            "x",
+            "wheel",
+            "arm.tip",
+            "z'",
+            "ü",
+            "{",
+            "}",
+            "{",
+            "}",
+            "(",
+            ")",
+            "[",
+            "]",
+            ",",
+            ":",
+            "=",
+            "->",
+            "..",
+            "+-",
+            "+",
+            "-",
+            "*",
+            "/",
+            "^",
+            "<",
+            ">",
+            "<=",
+            ".",
+            ";",
+            "#",
+            "\"",
+            "\"text\"",
+            "12",
+            "0.5 kN/m",
+            "1e-3",
+            "30 %",
+            "\n",
+            "\n",
+            "\n",
+            "// remark\n",
+            "/// documentation\n",
+            "€",
+        ];
+        prop::sample::select(words.to_vec()).prop_map(str::to_owned)
+    }
+
+    fn check(text: &str) -> Result<(), TestCaseError> {
+        let mut sources = Sources::new();
+        let file = sources.add("soup", text);
+        let (tree, diagnostics) = parse(file, text);
+        render(&diagnostics, &sources, false);
+        let printed = print(&tree);
+        if diagnostics.is_empty() {
+            let (again, errors) = parse(0, &printed);
+            prop_assert!(errors.is_empty(), "{}", printed);
+            prop_assert_eq!(shape(&tree), shape(&again));
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn any_tokens_are_read_or_refused(tokens in prop::collection::vec(token(), 0..60)) {
+            check(&tokens.join(" "))?;
+        }
+
+        #[test]
+        fn any_text_is_read_or_refused(text in "\\PC{0,80}") {
+            check(&text)?;
+        }
+
+        /// Good studies with a piece cut out: errors, but no panic, and other declarations survive.
+        #[test]
+        fn damaged_studies_are_read_or_refused(cut in 0usize..6000, length in 1usize..40, file in 0usize..2) {
+            let paths = study_files("tests/cases/syntax_good");
+            let text = fs::read_to_string(&paths[file]).expect("readable case");
+            let start = text.floor_char_boundary(cut.min(text.len()));
+            let end = text.floor_char_boundary((start + length).min(text.len()));
+            let damaged = format!("{}{}", &text[..start], &text[end..]);
+            check(&damaged)?;
+            let (tree, _) = parse(0, &damaged);
+            prop_assert!(tree.items.len() > 8, "only {} declarations survive", tree.items.len());
+        }
+    }
+}
+
+/// A megabyte of anything takes time proportional to it.
+#[test]
+fn large_texts_are_read_in_proportional_time() {
+    let hostile = [
+        "body a {\n",
+        "body a { m = (\n",
+        "body a { m = 1 kg }\n",
+        "body a { m 1 kg }\n",
+        "(",
+        "{",
+        "[ ",
+        "- ",
+        "if ",
+        "a = ",
+        "\"",
+        "///\n",
+        "}\n",
+        "measure a = ",
+        "1 + ",
+        "x^",
+        "law a(",
+        "variant a of b { add ",
+        "x.",
+        "1/",
+        "1 m*(",
+    ];
+    for piece in hostile {
+        let text = piece.repeat(400_000 / piece.len());
+        let start = std::time::Instant::now();
+        let (_, diagnostics) = parse(0, &text);
+        assert!(diagnostics.len() <= 50);
+        assert!(start.elapsed().as_secs_f64() < 10.0, "{piece:?} took {:?}", start.elapsed());
+    }
+    for head in ["measure a = ", "body a { m = ", "law f(x: rate) -> load { = ", "constant c = 2 "] {
+        for piece in ["- ", "if ", "1 + ", "2^", "x*(", "m*", "f(", "if a < b then 1 else "] {
+            let text = format!("{head}{}", piece.repeat(20_000));
+            let start = std::time::Instant::now();
+            let (tree, diagnostics) = parse(0, &text);
+            assert!(!diagnostics.is_empty(), "{head}{piece}");
+            print(&tree);
+            assert!(start.elapsed().as_secs_f64() < 10.0, "{head}{piece:?} took {:?}", start.elapsed());
+        }
+    }
+}

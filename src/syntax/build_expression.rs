@@ -181,6 +181,7 @@ impl Builder<'_> {
         if value.is_infinite() {
             let span = self.span(&number);
             self.report(Code::BAD_NUMBER, "the number is too large", span, "larger than 1.8e308");
+            return Some(ExpressionKind::Invalid);
         }
         Some(ExpressionKind::Number { value, unit })
     }
@@ -207,6 +208,7 @@ impl Builder<'_> {
                 span,
                 "vectors stand alone, as value of a field",
             );
+            return Some(Expression { kind: ExpressionKind::Invalid, span });
         }
         Some(expression)
     }

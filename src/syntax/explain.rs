@@ -25,8 +25,19 @@ pub(super) fn explain(file: u32, text: &str, tokens: &[Token], offset: usize, er
     let index = tokens.partition_point(|token| token.end <= at);
     let token = (index < tokens.len()).then_some(index);
     let context = Context { file, text, tokens, index };
+    let mut token = token;
     let diagnostic = match &error.variant {
-        ErrorVariant::ParsingError { positives, .. } => context.unexpected(positives),
+        ErrorVariant::ParsingError { positives, .. } => match context.missing_value(positives) {
+            Some((diagnostic, culprit)) => {
+                token = Some(culprit);
+                diagnostic
+            }
+            None if context.statement_is_incomplete(positives) => {
+                token = index.checked_sub(1);
+                context.incomplete(positives)
+            }
+            None => context.unexpected(positives),
+        },
         ErrorVariant::CustomError { .. } => {
             Diagnostic::error(Code::TOO_DEEP, "the declaration is nested too deeply to be read")
                 .label(context.span(), "while reading this")
@@ -105,26 +116,63 @@ impl Context<'_> {
 
     /// Errors that deserve a message of their own.
     fn special(&self, rules: &[Rule]) -> Option<Diagnostic> {
-        self.missing_value(rules).or_else(|| self.bad_number()).or_else(|| self.misspelt_word(rules))
+        self.bad_number().or_else(|| self.misspelt_word(rules))
     }
 
-    /// `mass =` with nothing behind it; the next line then looks like the value.
-    fn missing_value(&self, rules: &[Rule]) -> Option<Diagnostic> {
-        let (key, equals) = if self.word(0) == "=" && self.word(-2) == "=" && self.tokens[self.index - 1].first_on_line
+    /// `mass =` with nothing behind it: the value is missing at the end of its line, and the first word of the next
+    /// line was taken for it. Also returns the token that lacks its value.
+    fn missing_value(&self, rules: &[Rule]) -> Option<(Diagnostic, usize)> {
+        let next_line_was_taken = matches!(self.word(0), "=" | "in" | ":")
+            && self.kind(-1) == Some(TokenKind::Word)
+            && self.first_on_line(-1);
+        let places = if next_line_was_taken && needs_value(self.word(-2)) {
+            -2
+        } else if rules.iter().any(|rule| begins_value(*rule))
+            && needs_value(self.word(-1))
+            && !self.begins_like_value()
         {
-            (self.word(-3), self.span_of(-2))
-        } else if self.word(-1) == "=" && rules.iter().any(|rule| begins_value(*rule)) && !self.begins_like_value() {
-            (self.word(-2), self.span_of(-1))
+            -1
         } else {
             return None;
         };
-        let message =
-            if key.is_empty() { "the value after `=` is missing".to_owned() } else { format!("`{key}` has no value") };
-        Some(Diagnostic::error(Code::UNEXPECTED_TEXT, message).label(equals, "expected a value after `=`"))
+        let (sign, before) = (self.word(places), self.word(places - 1));
+        let message = match (sign, before) {
+            ("=", key) if self.kind(places - 1) == Some(TokenKind::Word) => format!("`{key}` has no value"),
+            (".", ".") => "the upper end of the range is missing".to_owned(),
+            ("-", "+") => "the standard deviation after `+-` is missing".to_owned(),
+            (sign, _) => format!("the value after `{sign}` is missing"),
+        };
+        let diagnostic = Diagnostic::error(Code::UNEXPECTED_TEXT, message)
+            .label(self.span_of(places), "expected a value behind this");
+        Some((diagnostic, self.index.checked_add_signed(places)?))
+    }
+
+    /// The line, or what the braces contain, ended too early.
+    fn statement_is_incomplete(&self, rules: &[Rule]) -> bool {
+        let ended = self.first_on_line(0) || matches!(self.kind(0), None | Some(TokenKind::Close(_)));
+        let complete = [Rule::close_brace, Rule::close_paren, Rule::close_bracket, Rule::EOI];
+        ended && self.index > 0 && !rules.iter().any(|rule| complete.contains(rule))
+    }
+
+    fn incomplete(&self, rules: &[Rule]) -> Diagnostic {
+        let end = self.span_of(-1).end;
+        let message = format!("expected {} after `{}`", expectation(rules), self.word(-1));
+        let finding = Diagnostic::error(Code::UNEXPECTED_TEXT, message)
+            .label(Span { file: self.file, start: end, end }, "something is missing here");
+        match self.help(rules) {
+            Some(help) => finding.help(help),
+            None => finding,
+        }
+    }
+
+    fn first_on_line(&self, places: isize) -> bool {
+        let index = self.index.checked_add_signed(places);
+        index.and_then(|index| self.tokens.get(index)).is_some_and(|token| token.first_on_line)
     }
 
     fn begins_like_value(&self) -> bool {
-        !matches!(self.kind(0), None | Some(TokenKind::Close(_))) && self.word(0) != ","
+        let ends = matches!(self.kind(0), None | Some(TokenKind::Close(_)));
+        !ends && !matches!(self.word(0), "," | "from" | "prior" | "in" | "then" | "else" | "by")
     }
 
     fn bad_number(&self) -> Option<Diagnostic> {
@@ -167,7 +215,7 @@ impl Context<'_> {
         if self.kind(0) != Some(TokenKind::Word) {
             return None;
         }
-        let similar = similar_name(self.word(0), rules.iter().filter_map(|rule| keyword(*rule)))?;
+        let similar = similar_name(self.word(0), rules.iter().flat_map(|rule| keywords(*rule)))?;
         if similar == self.word(0) {
             return None;
         }
@@ -181,6 +229,9 @@ impl Context<'_> {
         let operator = rules.contains(&Rule::multiply);
         let help = match found {
             "*" if self.word(-1) == "*" => "powers are written `x^2`".to_owned(),
+            "=" if operator && (self.word(1) == "=" || self.word(-1) == "=") => {
+                "there is no test for equality; compare with `<`, `<=`, `>` or `>=`".to_owned()
+            }
             "=" if self.word(-1) == "=" => "a field is written `key = value`, with one `=`".to_owned(),
             ":" if rules.contains(&Rule::equals) => "write `=` instead of `:`".to_owned(),
             "=" if rules.contains(&Rule::colon) => "write `:` instead of `=`".to_owned(),
@@ -226,6 +277,14 @@ impl Context<'_> {
     }
 }
 
+/// Signs and words that a value must follow.
+fn needs_value(text: &str) -> bool {
+    matches!(
+        text,
+        "=" | "+" | "-" | "*" | "/" | "^" | "<" | ">" | "." | "from" | "prior" | "adds" | "by" | "if" | "then" | "else"
+    )
+}
+
 fn begins_field_value(kind: Option<TokenKind>) -> bool {
     matches!(kind, Some(TokenKind::Number | TokenKind::Word | TokenKind::Text { .. }))
 }
@@ -239,7 +298,11 @@ fn expectation(rules: &[Rule]) -> String {
     let mut words: Vec<(u8, String)> = rules.iter().filter_map(|rule| description(*rule)).collect();
     words.sort();
     words.dedup();
-    // Operators may follow every expression; they are worth naming only where nothing else can stand.
+    // Operators may follow every expression, commas every entry; they are worth naming only where nothing else can
+    // stand. Names and parentheses are expressions.
+    let has = |rank: u8| rules.iter().filter_map(|rule| description(*rule)).any(|(other, _)| other == rank);
+    let (value, entry) = (has(VALUE_RANK), has(ENTRY_RANK));
+    words.retain(|(rank, word)| !(value && matches!(rank, 2 | 3)) && !(entry && word == "`,`" || word == "`point`"));
     if words.iter().any(|(rank, _)| *rank < OPERATOR_RANK) {
         words.retain(|(rank, _)| *rank < OPERATOR_RANK);
     }
@@ -251,6 +314,8 @@ fn expectation(rules: &[Rule]) -> String {
     }
 }
 
+const VALUE_RANK: u8 = 4;
+const ENTRY_RANK: u8 = 5;
 const OPERATOR_RANK: u8 = 9;
 
 /// How a rule is called in messages, and its rank in the list.
@@ -265,7 +330,7 @@ fn description(rule: Rule) -> Option<(u8, String)> {
         Rule::range_dots => (0, "`..`"),
         Rule::plus_minus => (0, "`+-`"),
         Rule::joint_axis | Rule::open_paren => (2, "`(`"),
-        Rule::name | Rule::path | Rule::declared_name | Rule::declared | Rule::member => (3, "a name"),
+        Rule::name | Rule::path | Rule::removed | Rule::declared_name | Rule::declared | Rule::member => (3, "a name"),
         Rule::derivative => (3, "a derivative `z'`"),
         Rule::text => (3, "a text in quotes"),
         Rule::written_unit | Rule::open_bracket => (3, "a unit in brackets"),
@@ -273,8 +338,8 @@ fn description(rule: Rule) -> Option<(u8, String)> {
         Rule::type_expression | Rule::type_factor | Rule::type_name => (3, "a type"),
         Rule::type_one => return None,
         Rule::axis | Rule::direction => (3, "an axis `x`, `y`, `z`"),
-        Rule::declaration | Rule::changed => (3, "a declaration"),
-        Rule::value | Rule::range => (4, "a value"),
+        Rule::declaration | Rule::changed => (3, "a declaration (`force`, `signal`, `effect`, ...)"),
+        Rule::value | Rule::range => (VALUE_RANK, "a value"),
         Rule::expression
         | Rule::quantity
         | Rule::number
@@ -282,19 +347,19 @@ fn description(rule: Rule) -> Option<(u8, String)> {
         | Rule::call
         | Rule::choice
         | Rule::parenthesis
-        | Rule::callee => (4, "an expression"),
+        | Rule::callee => (VALUE_RANK, "an expression"),
         Rule::sign | Rule::block | Rule::named_block | Rule::block_name | Rule::documentation | Rule::unit => {
             return None;
         }
         Rule::documentation_line | Rule::if_word => return None,
-        Rule::field => (5, "a field `key = value`"),
-        Rule::point => (5, "`point`"),
-        Rule::entry => (5, "an entry"),
-        Rule::identify_line => (5, "a line `name in 1 N .. 2 N from 1.5 N`"),
-        Rule::lowpass => (5, "`lowpass`"),
-        Rule::change => (5, "`add`, `remove`, `replace` or `identify`"),
-        Rule::law_statement => (5, "`param`, `let`, `state` or `= value`"),
-        Rule::effect_statement => (5, "`amplitude`, `shape`, `let`, `state`, `adds` or `replaces`"),
+        Rule::field => (ENTRY_RANK, "a field `key = value`"),
+        Rule::point => (ENTRY_RANK, "`point`"),
+        Rule::entry => (ENTRY_RANK, "an entry"),
+        Rule::identify_line => (ENTRY_RANK, "a line `name in 1 N .. 2 N from 1.5 N`"),
+        Rule::lowpass => (ENTRY_RANK, "`lowpass`"),
+        Rule::change => (ENTRY_RANK, "`add`, `remove`, `replace` or `identify`"),
+        Rule::law_statement => (ENTRY_RANK, "`param`, `let`, `state` or `= value`"),
+        Rule::effect_statement => (ENTRY_RANK, "`amplitude`, `shape`, `let`, `state`, `adds` or `replaces`"),
         Rule::comma => (6, "`,`"),
         Rule::fields | Rule::open_brace => (7, "`{`"),
         Rule::close_brace => (8, "`}`"),
@@ -315,6 +380,19 @@ fn description(rule: Rule) -> Option<(u8, String)> {
         _ => return None,
     };
     Some((rank, text.to_owned()))
+}
+
+/// The keywords with which a rule may begin.
+fn keywords(rule: Rule) -> Vec<&'static str> {
+    match rule {
+        Rule::change => vec!["add", "remove", "replace", "identify"],
+        Rule::law_statement => vec!["param", "let", "state"],
+        Rule::effect_statement => vec!["amplitude", "shape", "let", "state", "adds", "replaces"],
+        Rule::lowpass => vec!["lowpass"],
+        Rule::changed => KEYWORDS.to_vec(),
+        Rule::flag => vec!["one_sided", "finite"],
+        _ => keyword(rule).into_iter().collect(),
+    }
 }
 
 /// The keyword a rule stands for.

@@ -153,11 +153,11 @@ impl Splitter<'_> {
     }
 
     fn finish(&self, unclosed: Option<usize>, wrong: Option<End>, too_deep: Option<usize>, next: usize) -> End {
-        match (too_deep, wrong, unclosed) {
+        match (too_deep, unclosed, wrong) {
             (Some(open), _, _) => End::TooDeep { open, next },
-            (_, Some(End::Mismatch { open, close, .. }), _) => End::Mismatch { open, close, next },
-            (_, Some(End::Stray { close, .. }), _) => End::Stray { close, next },
-            (_, _, Some(open)) => End::Unclosed { open, next },
+            (_, Some(open), _) => End::Unclosed { open, next },
+            (_, _, Some(End::Mismatch { open, close, .. })) => End::Mismatch { open, close, next },
+            (_, _, Some(End::Stray { close, .. })) => End::Stray { close, next },
             _ => End::At(next),
         }
     }
@@ -217,13 +217,11 @@ impl Splitter<'_> {
             Diagnostic::error(Code::NOT_YET, format!("`{word}` is not yet part of the language"))
                 .label(span, "planned for a later version")
         } else if self.tokens[first].kind == TokenKind::Word {
-            let similar = similar_name(word, KEYWORDS);
             let finding = Diagnostic::error(Code::UNKNOWN_KEYWORD, format!("`{word}` does not begin a declaration"))
                 .label(span, "expected a declaration, e.g. `body`, `joint`, `force`, `measure`");
-            if similar.is_none() && self.tokens.get(first + 1).is_some_and(|next| next.text(self.text) == "=") {
-                finding.help(format!("a named number is written `constant {word} = ...`"))
-            } else {
-                finding.suggest(similar)
+            match similar_name(word, KEYWORDS).map(str::to_owned).or_else(|| self.keyword_before(first)) {
+                Some(declaration) => finding.help(format!("did you mean `{declaration}`?")),
+                None => finding,
             }
         } else if matches!(self.tokens[first].kind, TokenKind::Close(_)) {
             return false;
@@ -237,6 +235,16 @@ impl Splitter<'_> {
         };
         self.diagnostics.push(diagnostic);
         false
+    }
+
+    /// For a declaration that lacks its keyword, the beginning of what was probably meant.
+    fn keyword_before(&self, first: usize) -> Option<String> {
+        let text = |at: usize| self.tokens.get(at).map_or("", |token| token.text(self.text));
+        let word = text(first);
+        if text(first + 1) == "=" {
+            return Some(format!("constant {word} = ..."));
+        }
+        (text(first + 2) == ":").then(|| format!("force {}: {word} ...", text(first + 1)))
     }
 
     fn report_mismatch(&mut self, open: usize, close: usize) {
