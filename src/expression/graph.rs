@@ -276,7 +276,7 @@ impl Graph {
     }
 
     /// `operation` with other operands, simplified.
-    fn rebuild(&mut self, operation: Operation, of: impl Fn(Node) -> Node) -> Node {
+    pub fn rebuild(&mut self, operation: Operation, of: impl Fn(Node) -> Node) -> Node {
         match operation {
             Operation::Constant(_) | Operation::Symbol(_) => self.intern(operation),
             Operation::Unary(function, a) => self.unary(function, of(a)),

@@ -11,7 +11,10 @@
 mod differentiate;
 mod graph;
 mod print;
+#[cfg(test)]
+mod properties;
 mod simplify;
 
 pub use differentiate::Entry;
 pub use graph::{Binary, Graph, Node, Operation, Symbol, Unary};
+pub use print::Printer;

@@ -78,6 +78,14 @@ fn constant_sum(graph: &Graph, node: Node) -> Option<(f64, Node)> {
     }
 }
 
+/// `(c, x)` of `c - x` with constant c.
+fn constant_difference(graph: &Graph, node: Node) -> Option<(f64, Node)> {
+    match graph.operation(node) {
+        Operation::Binary(Binary::Subtract, a, b) => graph.constant_value(a).map(|c| (c, b)),
+        _ => None,
+    }
+}
+
 /// `(c, x)` of `c x` with constant c.
 fn constant_product(graph: &Graph, node: Node) -> Option<(f64, Node)> {
     match graph.operation(node) {
@@ -121,9 +129,18 @@ fn add(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Option<f64
         return graph.subtract(right, inner);
     }
     for (constant, other) in [(a, right), (b, left)] {
-        if let (Some(c), Some((inner, rest))) = (constant, constant_sum(graph, other)) {
+        let Some(c) = constant else { continue };
+        if let Some((inner, rest)) = constant_sum(graph, other) {
             let sum = graph.constant(c + inner);
             return graph.add(sum, rest);
+        }
+        if let Some((inner, rest)) = constant_difference(graph, other) {
+            let sum = graph.constant(c + inner);
+            return graph.subtract(sum, rest);
+        }
+        if c < 0.0 {
+            let positive = graph.constant(-c);
+            return graph.subtract(other, positive);
         }
     }
     if is_sine_and_cosine_squared(graph, left, right) {
@@ -154,9 +171,26 @@ fn subtract(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Optio
         let sum = graph.add(inner, right);
         return graph.negate(sum);
     }
-    if let (Some(c), Some((inner, rest))) = (b, constant_sum(graph, left)) {
-        let sum = graph.constant(inner - c);
-        return graph.add(sum, rest);
+    if let Some(c) = b {
+        let minus = graph.constant(-c);
+        if c < 0.0 || constant_sum(graph, left).or(constant_difference(graph, left)).is_some() {
+            return graph.add(left, minus);
+        }
+    }
+    if let Some(c) = a {
+        if let Some((inner, rest)) = constant_sum(graph, right) {
+            let difference = graph.constant(c - inner);
+            return graph.subtract(difference, rest);
+        }
+        if let Some((inner, rest)) = constant_difference(graph, right) {
+            let difference = graph.constant(c - inner);
+            return graph.add(difference, rest);
+        }
+        if c < 0.0 {
+            let positive = graph.constant(-c);
+            let sum = graph.add(positive, right);
+            return graph.negate(sum);
+        }
     }
     if let Some(difference) = cancelled(graph, left, right) {
         return difference;
@@ -182,7 +216,11 @@ fn multiply(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Optio
         match constant {
             Some(0.0) => return graph.constant(0.0),
             Some(1.0) => return other,
-            Some(-1.0) => return graph.negate(other),
+            Some(c) if c < 0.0 => {
+                let positive = graph.constant(-c);
+                let product = graph.multiply(positive, other);
+                return graph.negate(product);
+            }
             _ => {}
         }
     }
@@ -212,9 +250,18 @@ fn divide(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Option<
     if a == Some(0.0) {
         return left;
     }
-    match b {
-        Some(1.0) => return left,
-        Some(-1.0) => return graph.negate(left),
+    match (a, b) {
+        (_, Some(1.0)) => return left,
+        (_, Some(c)) if c < 0.0 => {
+            let positive = graph.constant(-c);
+            let quotient = graph.divide(left, positive);
+            return graph.negate(quotient);
+        }
+        (Some(c), _) if c < 0.0 => {
+            let positive = graph.constant(-c);
+            let quotient = graph.divide(positive, right);
+            return graph.negate(quotient);
+        }
         _ => {}
     }
     if left == right {

@@ -100,21 +100,8 @@ impl Inertia {
         Inertia { rotational: vector::mirrored(rotational), coupling: new_coupling, translational }
     }
 
-    /// `I - U U^T / D`. Where D is an element of U (an axis along a frame's axis) the removed direction vanishes
-    /// structurally, because `D / D` folds to one.
-    fn without(&self, graph: &mut Graph, along: Wrench, divisor: Node) -> Inertia {
-        let one = graph.constant(1.0);
-        let inverse = graph.divide(one, divisor);
-        let ratio = |graph: &mut Graph, v: Vector| {
-            v.map(|component| {
-                let quotient = graph.divide(component, divisor);
-                match graph.constant_value(quotient) {
-                    Some(_) => quotient,
-                    None => graph.multiply(component, inverse),
-                }
-            })
-        };
-        let scaled = Wrench { moment: ratio(graph, along.moment), force: ratio(graph, along.force) };
+    /// `I - U (U / D)^T`.
+    fn without(&self, graph: &mut Graph, along: Wrench, scaled: Wrench) -> Inertia {
         let mut reduce = |m: Matrix, left: Vector, right: Vector| -> Matrix {
             std::array::from_fn(|i| {
                 std::array::from_fn(|j| {
@@ -128,6 +115,28 @@ impl Inertia {
         let coupling = reduce(self.coupling, along.moment, scaled.force);
         Inertia { rotational: vector::mirrored(rotational), coupling, translational: vector::mirrored(translational) }
     }
+
+    /// The elements on the diagonal: rotational, translational.
+    fn diagonals(&self) -> [Vector; 2] {
+        [self.rotational, self.translational].map(|m| std::array::from_fn(|i| m[i][i]))
+    }
+}
+
+/// `U / D`. Where D is an element of U (an axis along a frame's axis) the ratio folds to one, and the direction that the
+/// joint frees vanishes structurally from the inertia.
+fn ratio(graph: &mut Graph, along: Wrench, divisor: Node) -> Wrench {
+    let one = graph.constant(1.0);
+    let inverse = graph.divide(one, divisor);
+    let mut ratio = |v: Vector| {
+        v.map(|component| {
+            let quotient = graph.divide(component, divisor);
+            match graph.constant_value(quotient) {
+                Some(_) => quotient,
+                None => graph.multiply(component, inverse),
+            }
+        })
+    };
+    Wrench { moment: ratio(along.moment), force: ratio(along.force) }
 }
 
 /// Inertia of a body about `origin` (its own origin at `offset` from there), parallel axes.
@@ -167,6 +176,8 @@ pub(super) struct Accelerated {
     pub acceleration: Node,
     /// S^T I^A S: what the joint has to move, the outer joints free. Zero: the acceleration is undetermined.
     pub moved_inertia: Node,
+    /// Diagonal of I^A, rotational and translational: what `moved_inertia` is a projection of.
+    pub around: [Vector; 2],
 }
 
 /// Accelerations of all coordinates under `loads` on the coordinates and `wrenches` on the links.
@@ -199,10 +210,10 @@ pub(super) fn articulated_bodies(
         along.push(u);
         moved.push((divisor, driving));
         if let Some(p) = tree.links[i].predecessor {
-            let reduced = inertia[i].without(graph, u, divisor);
+            let scaled = ratio(graph, u, divisor);
+            let reduced = inertia[i].without(graph, u, scaled);
             let by_bias = reduced.apply(graph, (frame.angular_bias, frame.bias));
-            let quotient = graph.divide(driving, divisor);
-            let by_drive = u.scale(graph, quotient);
+            let by_drive = scaled.scale(graph, driving);
             let total = bias[i].add(graph, by_bias).add(graph, by_drive).carried_back(graph, frame);
             let carried = reduced.carried_back(graph, frame);
             inertia[p] = inertia[p].add(graph, carried);
@@ -232,7 +243,7 @@ pub(super) fn articulated_bodies(
             angular: vector::add(graph, angular, turning),
             linear: vector::add(graph, linear, shifting),
         });
-        result.push(Accelerated { acceleration, moved_inertia: divisor });
+        result.push(Accelerated { acceleration, moved_inertia: divisor, around: inertia[i].diagonals() });
     }
     result
 }

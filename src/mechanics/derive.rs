@@ -36,7 +36,7 @@ pub fn derive(study: &Study) -> Result<System, Vec<Diagnostic>> {
     refuse_accelerations(&graph, study, &tree, &loads, &meaning)?;
 
     let accelerated = accelerate(&mut graph, study, &tree, &frames, &inertias, (&geometries, &loads));
-    refuse_missing_inertia(&graph, study, &tree, &inertias, &accelerated)?;
+    refuse_missing_inertia(&graph, study, &tree, &accelerated)?;
     add_accelerations(&mut graph, study, &tree, &frames, &accelerated, &mut meaning);
     assemble(graph, study, &tree, &accelerated, &meaning)
 }
@@ -164,15 +164,14 @@ fn accelerate(
     articulated::articulated_bodies(graph, tree, frames, inertias, &coordinate_loads, &wrenches, study.gravity)
 }
 
-/// Below this part of the inertia that moves with an axis when all joints are locked, what remains is rounding.
-const NEGLIGIBLE_INERTIA: f64 = 1e-10;
+/// Below this part of the inertia in other directions, what a joint moves is rounding.
+const NEGLIGIBLE_INERTIA: f64 = 1e-12;
 
 /// Evaluates what each joint moves at one general configuration: zero there means zero nearly everywhere.
 fn refuse_missing_inertia(
     graph: &Graph,
     study: &Study,
     tree: &Tree,
-    inertias: &[Inertia],
     accelerated: &[Accelerated],
 ) -> Result<(), Vec<Diagnostic>> {
     let mut point: HashMap<Symbol, f64> = study.parameters.iter().map(|p| (p.symbol, p.start)).collect();
@@ -183,25 +182,30 @@ fn refuse_missing_inertia(
         };
         point.insert(link.symbols.position, general);
     }
-    let value = |roots: &[Node]| graph.evaluate(roots, |s| point.get(&s).copied().unwrap_or(0.0), |_, _, _| 0.0);
-    let moved = value(&accelerated.iter().map(|a| a.moved_inertia).collect::<Vec<_>>());
-    let all = |choose: fn(&Inertia) -> vector::Matrix| {
-        let diagonal: Vec<Node> =
-            inertias.iter().flat_map(|i| (0..3).map(|k| choose(i)[k][k]).collect::<Vec<_>>()).collect();
-        value(&diagonal).into_iter().map(f64::abs).fold(0.0, f64::max)
-    };
-    let (rotational, translational) = (all(|i| i.rotational), all(|i| i.translational));
-    let errors: Vec<Diagnostic> = tree
-        .links
-        .iter()
-        .zip(moved)
-        .filter(|(link, moved)| {
-            let reference = if matches!(link.axis, Axis::Turn(_)) { rotational } else { translational };
-            let is_moving = *moved > NEGLIGIBLE_INERTIA * reference;
-            !is_moving
-        })
-        .map(|(link, _)| no_inertia(study, tree, link.joint))
-        .collect();
+    let needed: Vec<Node> =
+        accelerated.iter().flat_map(|a| [&[a.moved_inertia][..], &a.around[0], &a.around[1]].concat()).collect();
+    let values = graph.evaluate(&needed, |s| point.get(&s).copied().unwrap_or(0.0), |_, _, _| 0.0);
+    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+
+    // Outer joints first: where one fails, what lies further in is not determined and not to blame.
+    let mut reference = vec![[0.0_f64; 2]; tree.links.len()];
+    let mut is_in_shadow = vec![false; tree.links.len()];
+    let mut errors = Vec::new();
+    for (number, link) in tree.links.iter().enumerate().rev() {
+        let values = &values[7 * number..7 * (number + 1)];
+        let around = [largest(&values[1..4]), largest(&values[4..7])];
+        let around: [f64; 2] = std::array::from_fn(|k| around[k].max(reference[number][k]));
+        let scale = if matches!(link.axis, Axis::Turn(_)) { around[0] } else { around[1] };
+        let is_moving = values[0] > NEGLIGIBLE_INERTIA * scale;
+        if !is_moving && !is_in_shadow[number] {
+            errors.push(no_inertia(study, tree, link.joint));
+        }
+        if let Some(p) = link.predecessor {
+            is_in_shadow[p] |= is_in_shadow[number] || !is_moving;
+            reference[p] = std::array::from_fn(|k| reference[p][k].max(around[k]));
+        }
+    }
+    errors.reverse();
     if errors.is_empty() { Ok(()) } else { Err(errors) }
 }
 

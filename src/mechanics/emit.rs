@@ -1,1 +1,212 @@
-//! Stable text of a study's mechanics.
+//! Stable text of a study's mechanics (`ident compile --emit tree|model|equations`). All numbers SI.
+
+use super::system::{StartEquation, System};
+use super::topology::{Tree, spanning_tree};
+use crate::diagnostics::Diagnostic;
+use crate::expression::{Graph, Node, Printer};
+use crate::study::{Attachment, Force, ForcePlace, JointKind, StartBase, Study};
+use std::fmt::Write;
+
+/// The spanning tree: ground, joints with their coordinates, bodies.
+///
+/// # Errors
+///
+/// Those of the topology: bodies without connection to ground, closed loops.
+pub fn emit_tree(study: &Study) -> Result<String, Vec<Diagnostic>> {
+    let mut graph = study.graph.clone();
+    let tree = spanning_tree(study, &mut graph)?;
+    let mut text = format!("tree {} ({})\nground\n", study.name, study.variant);
+    branches(&mut text, study, &tree, None, 1);
+    let moving = tree.links.len();
+    let _ =
+        writeln!(text, "\n{} bodies, {} joints, {moving} degrees of freedom", study.bodies.len(), study.joints.len());
+    Ok(text)
+}
+
+/// What hangs on body `on` (`None`: ground), indented.
+fn branches(text: &mut String, study: &Study, tree: &Tree, on: Option<usize>, depth: usize) {
+    for &(number, body) in &tree.walk {
+        let joint = &study.joints[number];
+        let is_reversed = joint.parent.body == Some(body);
+        let from = if is_reversed { joint.child.body } else { joint.parent.body };
+        if from != on {
+            continue;
+        }
+        let note = if is_reversed { "  (declared from this body)" } else { "" };
+        let coordinate = joint.coordinate.map_or(String::new(), |_| format!("  [{}.position]", joint.name));
+        let _ = writeln!(
+            text,
+            "{}{} <- {}: {}{coordinate}{note}",
+            "  ".repeat(depth),
+            study.bodies[body].name,
+            joint.name,
+            kind_text(joint.kind)
+        );
+        branches(text, study, tree, Some(body), depth + 1);
+    }
+}
+
+fn kind_text(kind: JointKind) -> String {
+    match kind {
+        JointKind::Fixed => "fixed".into(),
+        JointKind::Prismatic { axis } => format!("prismatic({})", axis_text(axis)),
+        JointKind::Revolute { axis } => format!("revolute({})", axis_text(axis)),
+    }
+}
+
+/// `x`, `-z`, or components.
+fn axis_text(axis: [f64; 3]) -> String {
+    for (i, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let others_vanish = (0..3).all(|j| j == i || axis[j] == 0.0);
+        if others_vanish && axis[i].abs() == 1.0 {
+            return if axis[i] > 0.0 { name.into() } else { format!("-{name}") };
+        }
+    }
+    format!("{}, {}, {}", axis[0], axis[1], axis[2])
+}
+
+/// The study as it was understood: bodies, joints, forces with their loads, states, measures, starts.
+pub fn emit_model(study: &Study, system: &System) -> String {
+    let inputs = input_names(study);
+    let printer = Printer::plain(&study.graph, &inputs);
+    let mut text = format!("model {} ({})\n", study.name, study.variant);
+    let _ = writeln!(text, "gravity = {}", vector_text(&printer, &study.gravity));
+    for parameter in &study.parameters {
+        let _ = writeln!(
+            text,
+            "parameter {} in {} .. {} from {}",
+            parameter.name, parameter.lower, parameter.upper, parameter.start
+        );
+    }
+    for input in &study.inputs {
+        let _ = writeln!(text, "input {} [{}]", input.name, input.unit.symbol);
+    }
+    text.push('\n');
+    for body in &study.bodies {
+        let _ = writeln!(text, "body {}: mass {}", body.name, printer.text(body.mass));
+        if !is_zero(&study.graph, &body.centre_of_gravity) {
+            let _ = writeln!(text, "  centre of gravity {}", vector_text(&printer, &body.centre_of_gravity));
+        }
+        if !is_zero(&study.graph, &body.inertia) {
+            let _ = writeln!(text, "  inertia {}", vector_text(&printer, &body.inertia));
+        }
+    }
+    for joint in &study.joints {
+        let ends = [&joint.parent, &joint.child].map(|end| attachment_text(study, &printer, end));
+        let _ = writeln!(text, "joint {}: {} {} -> {}", joint.name, kind_text(joint.kind), ends[0], ends[1]);
+    }
+    for force in &study.forces {
+        force_text(&mut text, study, &printer, force);
+    }
+    for signal in &study.signals {
+        let _ = writeln!(text, "signal {} = {}", signal.name, printer.text(signal.value));
+    }
+    for state in &study.states {
+        let _ = writeln!(text, "state {} from {}", state.name, printer.text(state.initial));
+        let _ = writeln!(text, "  {}' = {}", state.name, printer.text(state.derivative));
+    }
+    for measure in &study.measures {
+        let _ = writeln!(text, "measure {} [{}] = {}", measure.name, measure.unit.symbol, printer.text(measure.value));
+    }
+    for experiment in &study.experiments {
+        let base = match experiment.start.base {
+            StartBase::Equilibrium => "equilibrium",
+            StartBase::Rest => "rest",
+        };
+        let _ = writeln!(text, "experiment {} from {base}", experiment.name);
+        for &(symbol, value) in &experiment.start.overrides {
+            let _ = writeln!(text, "  {} = {}", study.graph.symbol_name(symbol), printer.text(value));
+        }
+    }
+    let _ = writeln!(
+        text,
+        "\n{} states, {} algebraic variables, {} parameters, {} outputs",
+        system.states.len(),
+        system.algebraic.len(),
+        system.parameters.len(),
+        system.outputs.len()
+    );
+    text
+}
+
+fn force_text(text: &mut String, study: &Study, printer: &Printer, force: &Force) {
+    let kind = if force.is_actuator { "actuator" } else { "force" };
+    let place = match &force.place {
+        ForcePlace::Joint(joint) => format!("on {}", study.joints[*joint].name),
+        ForcePlace::Between { first, second, along, free_length } => {
+            let mut place = [first, second].map(|end| attachment_text(study, printer, end)).join(" -> ");
+            if let Some(axis) = along {
+                let _ = write!(place, " along {}", axis_text(*axis));
+            }
+            if let Some(length) = free_length {
+                let _ = write!(place, " free length {}", printer.text(*length));
+            }
+            place
+        }
+    };
+    let _ = writeln!(text, "{kind} {}: {} {place}", force.name, force.law);
+    let _ = writeln!(text, "  load = {}", printer.text(force.load));
+}
+
+fn attachment_text(study: &Study, printer: &Printer, attachment: &Attachment) -> String {
+    let body = attachment.body.map_or("ground", |body| study.bodies[body].name.as_str());
+    if is_zero(&study.graph, &attachment.position) {
+        return body.to_owned();
+    }
+    format!("{body}{}", vector_text(printer, &attachment.position))
+}
+
+fn is_zero(graph: &Graph, components: &[Node]) -> bool {
+    components.iter().all(|&component| graph.is_zero(component))
+}
+
+fn vector_text(printer: &Printer, components: &[Node]) -> String {
+    let components: Vec<String> = components.iter().map(|&component| printer.text(component)).collect();
+    format!("({})", components.join(", "))
+}
+
+fn input_names(study: &Study) -> Vec<String> {
+    study.inputs.iter().map(|input| input.name.clone()).collect()
+}
+
+/// Rates, constraints, outputs and given start values as formulas; common subexpressions are named once.
+pub fn emit_equations(study: &Study, system: &System) -> String {
+    let inputs = input_names(study);
+    let mut roots: Vec<Node> = system.rates.iter().chain(&system.constraints).copied().collect();
+    roots.extend(system.outputs.iter().map(|output| output.value));
+    let printer = Printer::sharing(&system.graph, &inputs, &roots);
+    let mut text = format!("equations {} ({})\n", study.name, study.variant);
+    let definitions = printer.definitions();
+    if !definitions.is_empty() {
+        text.push_str("\nwhere\n");
+        for (name, formula) in definitions {
+            let _ = writeln!(text, "  {name} = {formula}");
+        }
+    }
+    text.push_str("\nrates\n");
+    for (state, &rate) in system.states.iter().zip(&system.rates) {
+        let _ = writeln!(text, "  {}' = {}", state.name, printer.text(rate));
+    }
+    if !system.constraints.is_empty() {
+        text.push_str("\nconstraints\n");
+    }
+    for &constraint in &system.constraints {
+        let _ = writeln!(text, "  0 = {}", printer.text(constraint));
+    }
+    text.push_str("\noutputs\n");
+    for output in &system.outputs {
+        let _ = writeln!(text, "  {} = {}", output.name, printer.text(output.value));
+    }
+    let plain = Printer::plain(&system.graph, &inputs);
+    for (equations, experiment) in system.starts.iter().zip(&study.experiments) {
+        let _ = writeln!(text, "\nstart {}", experiment.name);
+        for (state, equation) in system.states.iter().zip(equations) {
+            let value = match equation {
+                StartEquation::Value(node) => plain.text(*node),
+                StartEquation::Equilibrium => "equilibrium".into(),
+            };
+            let _ = writeln!(text, "  {} = {value}", state.name);
+        }
+    }
+    text
+}

@@ -9,6 +9,7 @@
 
 mod articulated;
 mod derive;
+mod emit;
 mod forces;
 mod kinematics;
 mod scale;
@@ -18,4 +19,5 @@ mod topology;
 mod vector;
 
 pub use derive::derive;
+pub use emit::{emit_equations, emit_model, emit_tree};
 pub use system::*;

@@ -65,29 +65,29 @@ pub(super) fn spanning_tree(study: &Study, graph: &mut Graph) -> Result<Tree, Ve
     let ground = study.bodies.len();
     let index = |attachment: &Attachment| attachment.body.unwrap_or(ground);
     let mut joints_at = vec![Vec::new(); ground + 1];
+    let mut errors = Vec::new();
+    // The joint declared last in a loop is the one that closes it.
+    let mut group: Vec<usize> = (0..=ground).collect();
     for (number, joint) in study.joints.iter().enumerate() {
+        let (kept, merged) = (group[index(&joint.parent)], group[index(&joint.child)]);
+        if kept == merged {
+            errors.push(closed_loop(joint));
+            continue;
+        }
+        group.iter_mut().filter(|member| **member == merged).for_each(|member| *member = kept);
         joints_at[index(&joint.parent)].push(number);
         joints_at[index(&joint.child)].push(number);
     }
     let mut seats: Vec<Option<Seat>> = vec![None; ground + 1];
     seats[ground] = Some(Seat { link: None, offset: vector::zero(graph) });
-    let mut used = vec![false; study.joints.len()];
     let mut tree = Tree { links: vec![], seats: vec![], link_of_joint: vec![None; study.joints.len()], walk: vec![] };
-    let mut errors = Vec::new();
     let mut queue = VecDeque::from([ground]);
     while let Some(from) = queue.pop_front() {
         for &number in &joints_at[from] {
-            if std::mem::replace(&mut used[number], true) {
-                continue;
-            }
             let joint = &study.joints[number];
             let is_reversed = index(&joint.parent) != from;
             let to = if is_reversed { index(&joint.parent) } else { index(&joint.child) };
-            let Some(seat) = seats[from] else { continue };
-            if seats[to].is_some() {
-                errors.push(closed_loop(joint));
-                continue;
-            }
+            let (Some(seat), None) = (seats[from], seats[to]) else { continue };
             seats[to] = Some(tree.attach(graph, (number, joint), is_reversed, seat, to));
             queue.push_back(to);
         }

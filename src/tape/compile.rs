@@ -2,7 +2,7 @@
 
 use super::model::{Derivative, Element, Layout, Model, StartProgram};
 use super::program::{Instruction, Program};
-use crate::expression::{Entry, Graph, Node, Operation, Symbol};
+use crate::expression::{Binary, Entry, Graph, Node, Operation, Symbol};
 use crate::linear::SparsityPattern;
 use crate::mechanics::{StartEquation, System, Variable};
 use std::collections::BTreeMap;
@@ -67,6 +67,7 @@ impl Model {
             })
             .collect();
 
+        let constant_end = assembler.constants.len();
         let mut registers = assembler.constants;
         registers.resize(assembler.next, 0.0);
         debug_assert_eq!(p, system.parameter_names.len());
@@ -80,6 +81,7 @@ impl Model {
             variables,
             registers,
             layout: assembler.layout,
+            constant_end,
             prologue,
             forcing,
             rates,
@@ -123,7 +125,8 @@ impl Roots {
         };
         let mut groups = vec![rates.collect::<Vec<_>>(), values(&system.outputs), values(&system.probes)];
         groups.extend(system.starts.iter().map(given));
-        let (graph, nodes) = system.graph.extract(&groups.concat());
+        let (mut graph, nodes) = system.graph.extract(&groups.concat());
+        let nodes = multiply_by_reciprocals(&mut graph, &nodes, &system.parameters);
         let mut rest = nodes.into_iter();
         let mut groups = groups.iter().map(|group| rest.by_ref().take(group.len()).collect::<Vec<_>>());
         let mut next = || groups.next().unwrap_or_default();
@@ -131,6 +134,35 @@ impl Roots {
         let starts = groups.collect();
         Self { graph, rates, outputs, probes, starts }
     }
+}
+
+/// Divisions of varying values by what only parameters determine, as multiplications: the reciprocal is computed once
+/// per parameter vector. Changes results by rounding.
+fn multiply_by_reciprocals(graph: &mut Graph, roots: &[Node], parameters: &[Symbol]) -> Vec<Node> {
+    let mut image: Vec<Node> = Vec::new();
+    let mut is_fixed: Vec<bool> = Vec::new();
+    let zero = graph.constant(0.0);
+    let one = graph.constant(1.0);
+    for node in graph.reachable(roots) {
+        image.resize(node.index() + 1, zero);
+        is_fixed.resize(node.index() + 1, false);
+        let operation = graph.operation(node);
+        let fixed = |child: Node| is_fixed[child.index()];
+        is_fixed[node.index()] = match operation {
+            Operation::Constant(_) => true,
+            Operation::Symbol(symbol) => parameters.contains(&symbol),
+            Operation::Sample { .. } => false,
+            _ => operation.children().all(fixed),
+        };
+        image[node.index()] = match operation {
+            Operation::Binary(Binary::Divide, a, b) if fixed(b) && !fixed(a) => {
+                let inverse = graph.divide(one, image[b.index()]);
+                graph.multiply(image[a.index()], inverse)
+            }
+            _ => graph.rebuild(operation, |child| image[child.index()]),
+        };
+    }
+    roots.iter().map(|root| image[root.index()]).collect()
 }
 
 /// What a node's value depends on at most.

@@ -9,10 +9,12 @@
 
 mod bound;
 mod compile;
+mod emit;
 mod model;
 mod program;
 
 pub use bound::{Bound, StartValues};
+pub use emit::emit_tape;
 pub use model::Model;
 
 /// Sampled inputs of an experiment as functions of time.

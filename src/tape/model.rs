@@ -20,6 +20,8 @@ pub struct Model {
     /// Registers before the first evaluation: constants in place, all else zero.
     pub(super) registers: Vec<f64>,
     pub(super) layout: Layout,
+    /// Registers from here on are written by programs.
+    pub(super) constant_end: usize,
     /// Of parameters only.
     pub(super) prologue: Program,
     /// Of time, inputs and parameters.
