@@ -33,7 +33,7 @@ impl Random {
                 _ => Tree::Symbol(self.below(3)),
             };
         }
-        let mut sub = |random: &mut Self| Box::new(random.tree(depth - 1, is_smooth));
+        let sub = |random: &mut Self| Box::new(random.tree(depth - 1, is_smooth));
         match self.below(10) {
             0 | 1 => Tree::Unary(self.unary(is_smooth), sub(self)),
             2 if !is_smooth => Tree::Select(Box::new([*sub(self), *sub(self), *sub(self)])),
@@ -91,11 +91,28 @@ impl Tree {
             Tree::Symbol(i) => (x[*i], 0.0),
             Tree::Unary(function, a) => {
                 let (a, e) = a.evaluate(x);
-                // Kinks and steps within reach of rounding count as undefined.
+                // Kinks and steps within reach of rounding count as undefined, as do ends of a domain.
+                let is_at_end = match function {
+                    Unary::Sqrt => a <= e,
+                    Unary::Asin | Unary::Acos => 1.0 - a.abs() <= e,
+                    _ => e.is_infinite(),
+                };
+                if is_at_end {
+                    return (function.evaluate(a), f64::INFINITY);
+                }
                 spread(&[a, a - 1e-14 * a.abs() - e, a + 1e-14 * a.abs() + e].map(|a| function.evaluate(a)))
             }
             Tree::Binary(function, a, b) => {
                 let ((a, ea), (b, eb)) = (a.evaluate(x), b.evaluate(x));
+                let is_at_end = match function {
+                    Binary::Power => a.abs() <= ea,
+                    // Signed zeros decide the side of the cut.
+                    Binary::Atan2 => a.abs() <= ea,
+                    _ => (ea + eb).is_infinite(),
+                };
+                if is_at_end {
+                    return (function.evaluate(a, b), f64::INFINITY);
+                }
                 let corners = [(0.0, 0.0), (ea, eb), (ea, -eb), (-ea, eb), (-ea, -eb)];
                 spread(&corners.map(|(da, db)| function.evaluate(a + da, b + db)))
             }
@@ -129,7 +146,7 @@ fn simplified_expressions_keep_their_value() {
         let node = tree.build(&mut graph, &symbols);
         let x = [random.real(), random.real(), random.real()];
         let (expected, bound) = tree.evaluate(&x);
-        if !(bound <= 1e-6 * (1.0 + expected.abs())) {
+        if !expected.is_finite() || !(bound <= 1e-6 * (1.0 + expected.abs())) {
             continue;
         }
         compared += 1;
@@ -158,7 +175,7 @@ fn derivatives_match_differences() {
         // Third derivatives show in the step's influence; rounding in the bound.
         let ((coarse, _), (fine, noise)) = (difference(4e-4), difference(2e-4));
         let uncertainty = (coarse - fine).abs() + noise;
-        if !(uncertainty < 1e-5 * (1.0 + fine.abs())) {
+        if !fine.is_finite() || !(uncertainty < 1e-5 * (1.0 + fine.abs())) {
             continue;
         }
         compared += 1;

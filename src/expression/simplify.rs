@@ -146,6 +146,12 @@ fn add(graph: &mut Graph, left: Node, right: Node, a: Option<f64>, b: Option<f64
     if is_sine_and_cosine_squared(graph, left, right) {
         return graph.constant(1.0);
     }
+    if let (Operation::Binary(Binary::Subtract, a, b), Operation::Binary(Binary::Subtract, c, d)) =
+        (graph.operation(left), graph.operation(right))
+        && (a, b) == (d, c)
+    {
+        return graph.constant(0.0);
+    }
     if left == right {
         let two = graph.constant(2.0);
         return graph.multiply(two, left);
@@ -348,8 +354,10 @@ impl Binary {
             Binary::Multiply => a * b,
             Binary::Divide => a / b,
             Binary::Power => a.powf(b),
-            Binary::Minimum => a.min(b),
-            Binary::Maximum => a.max(b),
+            // Unlike `f64::min`, an undefined operand makes the result undefined: failures must not be hidden.
+            Binary::Minimum if a.is_nan() || a < b => a,
+            Binary::Maximum if a.is_nan() || a > b => a,
+            Binary::Minimum | Binary::Maximum => b,
             Binary::Atan2 => a.atan2(b),
             Binary::Less => f64::from(u8::from(a < b)),
         }

@@ -148,7 +148,7 @@ fn multiply_by_reciprocals(graph: &mut Graph, roots: &[Node], parameters: &[Symb
         is_fixed.resize(node.index() + 1, false);
         let operation = graph.operation(node);
         let fixed = |child: Node| is_fixed[child.index()];
-        is_fixed[node.index()] = match operation {
+        let is_node_fixed = match operation {
             Operation::Constant(_) => true,
             Operation::Symbol(symbol) => parameters.contains(&symbol),
             Operation::Sample { .. } => false,
@@ -161,6 +161,7 @@ fn multiply_by_reciprocals(graph: &mut Graph, roots: &[Node], parameters: &[Symb
             }
             _ => graph.rebuild(operation, |child| image[child.index()]),
         };
+        is_fixed[node.index()] = is_node_fixed;
     }
     roots.iter().map(|root| image[root.index()]).collect()
 }

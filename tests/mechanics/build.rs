@@ -187,6 +187,7 @@ impl Builder {
             data: "data.csv".into(),
             time_column: "t".into(),
             columns: vec![],
+            constant_inputs: vec![],
             measures: vec![],
             window: None,
             start,

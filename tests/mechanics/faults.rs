@@ -19,7 +19,7 @@ fn assert_only(b: &Builder, code: Code, words: &[&str]) {
     for word in words {
         assert!(found[0].message.contains(word), "`{word}` is missing in `{}`", found[0].message);
     }
-    assert!(!found[0].help.is_empty() && !found[0].primary.is_empty());
+    assert!(found[0].span().is_some() && !found[0].help.is_empty());
 }
 
 /// `bodies` one after the other on joints of `kind`.
