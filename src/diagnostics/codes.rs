@@ -110,6 +110,98 @@ codes! {
     DIMENSION_MISMATCH "E0203" "dimensions do not agree"
     "Only quantities of the same dimension can be added, compared or assigned. Both places are marked.\n"
 
+    DUPLICATE_NAME "E0204" "declared twice"
+    "Every name is declared once, and every field given once. Everything that an expression can mention shares one\n\
+     namespace. In a variant, `replace` exchanges a declaration and `identify` an earlier line for the same target.\n"
+
+    CYCLIC_DEFINITION "E0205" "circular definition"
+    "A value depends on itself. The note names the way round. In a machine such a circle is always broken by something\n\
+     that stores: a mass, a filter, an actuator's lag; give one member a law with a state, e.g. `pt1`.\n"
+
+    NOT_IDENTIFIED "E0206" "name without a value"
+    "A free name in an expression is a parameter and must be identified:\n\
+     \n    identify { c_strut in 10 .. 40 kN/m from 22 kN/m }\n\
+     \nor a constant: `constant c_strut = 22 kN/m`.\n"
+
+    UNKNOWN_FIELD "E0207" "unknown field"
+    "The element, law or effect has no field of this name, or the place provides the quantity by itself (`x`, `v` and\n\
+     `inertia` of a law on a joint). The note lists the fields there are.\n"
+
+    MISSING_FIELD "E0208" "missing field"
+    "A port, parameter or field without default is not given. Nothing is assumed in its place.\n"
+
+    WRONG_VALUE "E0209" "value of the wrong sort"
+    "The value does not suit: a text where a number is needed, a word that is not one of the choices, a number outside\n\
+     of what makes sense (a negative mass, a standard deviation of zero).\n"
+
+    NOT_CONSTANT "E0210" "not a constant"
+    "Masses, positions and start values may depend on parameters but not on time or motion. Bounds, windows and edges\n\
+     of filters are plain numbers.\n"
+
+    WRONG_PLACE "E0211" "law or effect at a wrong place"
+    "Laws that give a force do not suit a revolute joint, an effect stands only on the kinds of places it declares, and\n\
+     fixed joints carry no elements. Laws written with `coordinate`, `rate` and `load` serve translation and rotation.\n"
+
+    FREQUENCY_UNIT "E0212" "frequency or angular velocity"
+    "Frequencies count periods (Hz), angular velocities count angle (rad/s, rpm); both are 1/s but differ by 2 pi. A\n\
+     parameter declared as one of them does not take the unit of the other: 1 Hz = 6.283 rad/s.\n"
+
+    WRONG_ARGUMENTS "E0213" "wrong number of arguments"
+    "The function takes another number of arguments.\n"
+
+    NOT_A_VALUE "E0215" "not a value"
+    "The name stands for a body, joint or element. Its quantities are values: `slide.position`, `tyre.force`,\n\
+     `arm.tip.velocity.x`.\n"
+
+    NOT_AN_INPUT "E0216" "past or rate not known"
+    "`delayed` and `derivative` need a function of time and inputs only: the past of states is not kept. A lag or a\n\
+     transport delay of other signals is a law with states.\n"
+
+    INVALID_DECLARATION "E0217" "law or effect declared wrongly"
+    "A law or effect needs what diagnosis and checking rely on: types for amplitudes and shapes, a range for every shape,\n\
+     at least one amplitude and one action, ports that the places really have.\n"
+
+    OVERRIDES_PRELUDE "E0218" "replaces the prelude's"
+    "A law or effect of the study has the name of one that ships with the tool, and is used instead of it.\n"
+
+    SAME_BODY "E0222" "both ends on one body"
+    "A joint or force element acts between two different bodies (or a body and ground).\n"
+
+    MISSING_INERTIA "E0224" "inertia missing"
+    "A revolute joint can turn this body, so its moment of inertia about the centre of gravity counts: `inertia = 2 kg*m^2`\n\
+     (the same about all axes) or `inertia = (Ixx, Iyy, Izz)`. A point mass has `inertia = 0 kg*m^2`.\n"
+
+    AXIS "E0226" "axis or direction"
+    "Prismatic and revolute joints have an axis, `prismatic(z)` or `revolute((0, 0.6, 0.8))`; fixed joints have none. A\n\
+     direction is not the zero vector.\n"
+
+    BOUNDS "E0230" "bounds out of order"
+    "A range runs from the smaller to the larger value, and a start value lies inside its bounds.\n"
+
+    IDENTIFY_TARGET "E0231" "cannot be identified"
+    "Identified is either a free name used in the study, or a number that the study holds fixed, by its path: `tyre.stiffness`,\n\
+     `wheel.mass`, `shaker.compression.slope`. A field that is given by an expression has no number to replace.\n"
+
+    UNUSED_PARAMETER "E0232" "parameter without influence"
+    "Nothing that is simulated or measured depends on the parameter, so the data cannot tell its value.\n"
+
+    MISSING_START "E0233" "start not stated"
+    "An experiment says how it starts: `start = equilibrium`, `start = rest`, or either with given values,\n\
+     `start = rest { slide.velocity = 6 mm/s }`. Start values may be parameters.\n"
+
+    FILTER_DESIGN "E0234" "filter cannot be designed"
+    "A low-pass filter passes below and stops above: the pass edge lies below the stop edge, and the largest drop in the\n\
+     pass band (dB) below the smallest attenuation in the stop band (dB).\n"
+
+    NO_STUDY "E0235" "no study declared"
+    "The file with the model begins with `study NAME \"title\"`.\n"
+
+    LEFT_OUT "E0236" "parameter left out in a variant"
+    "The variant removes what the parameter acts on; it is not identified in this variant.\n"
+
+    UNUSED_DECLARATION "E0237" "without use"
+    "Something is declared that nothing depends on.\n"
+
     // ---- E03xx: mechanics ----
 
     UNCONNECTED_BODY "E0301" "body is not connected to ground"

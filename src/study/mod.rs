@@ -5,6 +5,73 @@
 //! here*: kinematics (elements refer to their coordinates by symbols that [`crate::mechanics`] replaces), numbers
 //! that depend on data, file access other than `use` of further study files.
 
+mod assemble;
+mod bodies;
+mod channels;
+mod checker;
+mod declarations;
+mod effects;
+mod elements;
+mod evaluate;
+mod experiments;
+mod fields;
+mod functions;
+mod identify;
+mod instance;
+mod kinds;
+mod load;
 mod model;
+mod names;
+mod paths;
+mod places;
+mod ports;
+mod topology;
+mod trial;
+mod units;
 
+pub use load::{Loaded, load, load_text};
 pub use model::*;
+
+use crate::diagnostics::{Code, Diagnostic};
+
+/// A study without errors, and what should be said about it nevertheless.
+#[derive(Clone, Debug)]
+pub struct Checked {
+    pub study: Study,
+    /// Warnings and notes.
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// Checks a study with one of its variants (`None` or `base`: none).
+///
+/// # Errors
+/// All findings of reading and checking when at least one of them is an error, in order of their places.
+pub fn check(loaded: &Loaded, variant: Option<&str>) -> Result<Checked, Vec<Diagnostic>> {
+    let mut findings = Vec::new();
+    let declarations = declarations::collect(loaded, variant, &mut findings);
+    let mut checker = checker::Checker::new(&declarations, findings);
+    let study = checker.study();
+    let mut findings = checker.diagnostics;
+    if loaded.diagnostics.iter().any(Diagnostic::is_error) {
+        // What could not be read is missing; what depends on it is no finding of its own.
+        let is_consequence = |code: Code| {
+            [
+                Code::UNKNOWN_NAME,
+                Code::NOT_IDENTIFIED,
+                Code::UNUSED_PARAMETER,
+                Code::UNCONNECTED_BODY,
+                Code::NO_STUDY,
+                Code::MISSING_FIELD,
+                Code::IDENTIFY_TARGET,
+            ]
+            .contains(&code)
+        };
+        findings.retain(|finding| !is_consequence(finding.code));
+    }
+    findings.extend(loaded.diagnostics.iter().cloned());
+    findings.sort_by_key(|finding| finding.span().map(|span| (span.file, span.start)));
+    match study {
+        Some(study) if !findings.iter().any(Diagnostic::is_error) => Ok(Checked { study, warnings: findings }),
+        _ => Err(findings),
+    }
+}

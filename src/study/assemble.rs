@@ -1,0 +1,264 @@
+//! The stages of the check in order, and the study they make.
+
+use super::channels::text_of;
+use super::checker::{Allowed, Checker, Scope, Site};
+use super::declarations::Declarations;
+use super::model::{Force, ForcePlace, Signal, State, Study};
+use crate::diagnostics::{Code, Diagnostic};
+use crate::expression::{Graph, Node, Operation};
+use crate::syntax::ElementRole;
+
+const SCOPE: Scope = Scope::Study(Allowed::Number);
+
+impl<'a> Checker<'a> {
+    /// Runs all stages. `None` without a `study` line; findings are in [`Checker::diagnostics`].
+    pub fn study(&mut self) -> Option<Study> {
+        let declared: &'a Declarations<'a> = self.declared;
+        self.read_parameters();
+        self.read_inputs();
+        self.read_topology();
+        self.read_bodies();
+        self.place_elements();
+        let gravity = self.finished_gravity();
+        let forces = self.finished_forces();
+        let signals = self.finished_signals();
+        let measures = self.finished_measures();
+        self.check_all_fields();
+        self.states = self.finished_states();
+        let experiments = self.finished_experiments();
+        let (filter, remove_mean) = self.finished_filter();
+        let solver = self.finished_solver();
+        let groups = self.finished_groups();
+        let joints = self.finished_joints();
+        let places = self.finished_places(&forces, &measures);
+        let effects = self.effect_catalogue();
+        self.check_declarations();
+        let roots = self.roots(&gravity, &forces, &measures, &experiments);
+        let kept = self.check_influence(&roots);
+        self.check_unused(&roots);
+        let (name, title) = self.name_of_study()?;
+        self.constants.sort_by_key(|constant| (constant.span.file, constant.span.start));
+        let parameters = kept.into_iter().map(|index| self.parameters[index].clone()).collect();
+        Some(Study {
+            name,
+            title,
+            variant: declared.variant.clone(),
+            variants: declared.variants.iter().map(|name| name.text.clone()).collect(),
+            graph: std::mem::replace(&mut self.graph, Graph::new()),
+            time: self.time,
+            gravity,
+            parameters,
+            inputs: std::mem::take(&mut self.inputs),
+            bodies: std::mem::take(&mut self.bodies),
+            joints,
+            forces,
+            signals,
+            states: std::mem::take(&mut self.states),
+            measures,
+            point_quantities: std::mem::take(&mut self.point_quantities),
+            groups,
+            experiments,
+            filter,
+            remove_mean,
+            solver,
+            constants: std::mem::take(&mut self.constants),
+            effects,
+            places,
+        })
+    }
+
+    fn name_of_study(&mut self) -> Option<(String, String)> {
+        match self.declared.name {
+            Some((name, title)) => Some((name.text.clone(), text_of(title))),
+            None => {
+                let diagnostic = Diagnostic::error(Code::NO_STUDY, "the text declares no study")
+                    .help("begin with `study NAME \"what it is about\"`");
+                self.fail(diagnostic, SCOPE)
+            }
+        }
+    }
+
+    /// Force elements, actuators, then the loads that effects add to joints.
+    fn finished_forces(&mut self) -> Vec<Force> {
+        let declared: &'a Declarations<'a> = self.declared;
+        let mut forces = Vec::new();
+        for (index, element) in declared.forces.iter().enumerate() {
+            let load = self.site_value(Site::Force(index), element.name.span);
+            let placed = self.placed_forces.get(index).copied().flatten();
+            if let (Some(load), Some(placed)) = (load, placed)
+                && let Some(place) = self.finished_place(placed.place)
+            {
+                forces.push(Force {
+                    name: element.name.text.clone(),
+                    law: element.law.text.clone(),
+                    is_actuator: element.role == ElementRole::Actuator,
+                    place,
+                    load: load.node,
+                    coordinate: placed.coordinate,
+                    rate: placed.rate,
+                    span: element.name.span,
+                });
+            }
+        }
+        for (index, element) in declared.effects.iter().enumerate() {
+            let Some(instance) = self.effect_instances.get(index).copied().flatten() else { continue };
+            if self.instances[instance].site != Site::JointEffect(index) {
+                continue;
+            }
+            let load = self.site_value(Site::JointEffect(index), element.name.span);
+            if let (Some(load), Some((joint, coordinate, rate))) = (load, self.joint_of_effect(index)) {
+                forces.push(Force {
+                    name: element.name.text.clone(),
+                    law: element.law.text.clone(),
+                    is_actuator: false,
+                    place: ForcePlace::Joint(joint),
+                    load: load.node,
+                    coordinate,
+                    rate,
+                    span: element.name.span,
+                });
+            }
+        }
+        forces
+    }
+
+    fn finished_place(&self, place: ForcePlace) -> Option<ForcePlace> {
+        match place {
+            ForcePlace::Joint(joint) => self.joint_position(joint).map(ForcePlace::Joint),
+            between => Some(between),
+        }
+    }
+
+    fn joint_of_effect(&self, effect: usize) -> Option<(usize, crate::expression::Symbol, crate::expression::Symbol)> {
+        let crate::syntax::ElementPlace::On(name) = self.declared.effects[effect].place else { return None };
+        let joint = self.declared.joints.iter().position(|joint| joint.name.text == name.text)?;
+        let (symbols, _) = self.joint_symbols.get(joint).copied().flatten()?;
+        Some((self.joint_position(joint)?, symbols.position, symbols.velocity))
+    }
+
+    fn finished_signals(&mut self) -> Vec<Signal> {
+        let declared: &'a Declarations<'a> = self.declared;
+        let mut signals = Vec::new();
+        for (index, signal) in declared.signals.iter().enumerate() {
+            if let Some(value) = self.site_value(Site::Signal(index), signal.name.span) {
+                let (name, span) = (signal.name.text.clone(), signal.name.span);
+                signals.push(Signal { name, value: value.node, dimension: value.dimension, span });
+            }
+        }
+        signals
+    }
+
+    /// Every constant, field and binding is checked, whether or not a value depends on it.
+    fn check_all_fields(&mut self) {
+        let declared: &'a Declarations<'a> = self.declared;
+        for constant in &declared.constants {
+            self.path(constant.name, Scope::Study(Allowed::Constant));
+        }
+        for index in 0..self.instances.len() {
+            let instance = &self.instances[index];
+            let (span, bindings) = (instance.span, instance.bindings);
+            let fields: Vec<&'a str> = instance.declared.iter().map(|field| field.name.text.as_str()).collect();
+            for field in fields {
+                if self.instances[index].place_port(field).is_none() {
+                    self.own_field(index, field, span);
+                }
+            }
+            for (name, _) in bindings {
+                self.local(index, name);
+            }
+        }
+    }
+
+    fn finished_states(&mut self) -> Vec<State> {
+        let mut states = Vec::new();
+        for index in 0..self.instances.len() {
+            let declarations = self.instances[index].states;
+            for (at, checked) in self.check_states(index, declarations).into_iter().enumerate() {
+                let Some((symbol, initial, derivative)) = checked else { continue };
+                let name = self.instances[index].state_name(at);
+                states.push(State {
+                    symbol: self.graph.symbol(&name),
+                    name,
+                    derivative: derivative.node,
+                    initial: initial.node,
+                    dimension: symbol.dimension,
+                    span: declarations[at].name.span,
+                });
+            }
+        }
+        for sensor in std::mem::take(&mut self.sensor_states) {
+            states.push(State {
+                name: sensor.name,
+                symbol: sensor.symbol,
+                derivative: sensor.derivative,
+                initial: sensor.initial,
+                dimension: sensor.dimension,
+                span: sensor.span,
+            });
+        }
+        states
+    }
+
+    /// Nodes that decide what is simulated and measured.
+    fn roots(
+        &self,
+        gravity: &[Node; 3],
+        forces: &[Force],
+        measures: &[super::model::Measure],
+        experiments: &[super::model::Experiment],
+    ) -> Vec<Node> {
+        let mut roots: Vec<Node> = gravity.to_vec();
+        for (index, body) in self.bodies.iter().enumerate() {
+            roots.push(body.mass);
+            if self.topology.turns(index) {
+                roots.extend(body.inertia);
+                roots.extend(body.centre_of_gravity);
+                roots.extend(body.points.iter().flat_map(|point| point.position));
+            }
+        }
+        for force in forces {
+            roots.push(force.load);
+            if let ForcePlace::Between { first, second, free_length, .. } = force.place {
+                roots.extend(free_length);
+                roots.extend(first.position.into_iter().chain(second.position));
+            }
+        }
+        roots.extend(self.states.iter().flat_map(|state| [state.derivative, state.initial]));
+        roots.extend(measures.iter().map(|measure| measure.value));
+        roots.extend(self.point_quantities.iter().flat_map(|quantity| quantity.point.position));
+        roots.extend(
+            experiments.iter().flat_map(|experiment| experiment.start.overrides.iter().map(|(_, value)| *value)),
+        );
+        roots
+    }
+
+    /// Inputs that nothing samples are worth a warning: a name may have been forgotten.
+    fn check_unused(&mut self, roots: &[Node]) {
+        let mut sampled = vec![false; self.inputs.len()];
+        for node in self.graph.reachable(roots) {
+            if let Operation::Sample { input, .. } = self.graph.operation(node)
+                && let Some(flag) = sampled.get_mut(input as usize)
+            {
+                *flag = true;
+            }
+        }
+        let unused: Vec<(String, crate::diagnostics::Span)> = self
+            .inputs
+            .iter()
+            .zip(sampled)
+            .filter(|(_, sampled)| !sampled)
+            .map(|(input, _)| (input.name.clone(), input.span))
+            .collect();
+        for (name, span) in unused {
+            let diagnostic = Diagnostic::warning(Code::UNUSED_DECLARATION, format!("input `{name}` drives nothing"))
+                .label(span, "nothing depends on it");
+            self.report(diagnostic, SCOPE);
+        }
+        if self.declared.experiments.is_empty() {
+            let diagnostic = Diagnostic::warning(Code::UNUSED_DECLARATION, "the study has no experiment").help(
+                "add `experiment NAME { data = \"file.csv\", start = equilibrium }` to compare it with measurements",
+            );
+            self.report(diagnostic, SCOPE);
+        }
+    }
+}

@@ -1,0 +1,273 @@
+//! Masses, inertias and points of bodies.
+
+use super::checker::{Allowed, Checker, Key, Scope};
+use super::declarations::Declarations;
+use super::evaluate::{Typed, literal};
+use super::fields::{find, value_span};
+use super::identify::written_unit;
+use super::model::{Attachment, Body, Joint, JointKind, Point};
+use super::topology::End;
+use crate::diagnostics::{Code, Diagnostic, Span};
+use crate::expression::Node;
+use crate::quantities::Dimension;
+use crate::syntax::{Expression, Field, Value};
+
+const SCOPE: Scope = Scope::Study(Allowed::Constant);
+const AXES: [&str; 3] = ["x", "y", "z"];
+const TENSOR: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
+
+impl<'a> Checker<'a> {
+    /// Reads all bodies and the points of ground; masses may refer to each other, points may not.
+    pub fn read_bodies(&mut self) {
+        let declared: &'a Declarations<'a> = self.declared;
+        if let Some(ground) = &declared.ground {
+            self.known_fields("`ground`", ground.fields, &[]);
+            self.ground_points = self.points("ground", ground.points);
+        }
+        for body in &declared.bodies {
+            let name = &body.name.text;
+            self.known_fields(&format!("body `{name}`"), body.fields, &["mass", "centre_of_gravity", "inertia"]);
+            let zero = self.graph.constant(0.0);
+            let centre_of_gravity = match find(body.fields, "centre_of_gravity") {
+                Some(field) => self.vector(&format!("{name}.centre_of_gravity"), field).unwrap_or([zero; 3]),
+                None => [zero; 3],
+            };
+            let points = self.points(name, body.points);
+            let span = body.name.span;
+            let inertia = [zero; 6];
+            self.bodies.push(Body { name: name.clone(), mass: zero, centre_of_gravity, inertia, points, span });
+        }
+        for index in 0..declared.bodies.len() {
+            if let Some(mass) = self.body_mass(index) {
+                self.bodies[index].mass = mass.node;
+            }
+            if let Some(inertia) = self.body_inertia(index) {
+                self.bodies[index].inertia = inertia;
+            }
+        }
+        self.check_moving_masses();
+    }
+
+    /// The mass of a body; it must be stated.
+    pub fn body_mass(&mut self, index: usize) -> Option<Typed> {
+        let declared: &'a Declarations<'a> = self.declared;
+        let body = &declared.bodies[index];
+        self.once(Key::Mass(index), body.name.span, |checker| {
+            let Some(field) = find(body.fields, "mass") else {
+                let diagnostic =
+                    Diagnostic::error(Code::MISSING_FIELD, format!("body `{}` has no mass", body.name.text))
+                        .label(body.name.span, "`mass` is missing")
+                        .help("add `mass = .. kg`");
+                return checker.fail(diagnostic, SCOPE);
+            };
+            let expression = checker.field_expression(field)?;
+            let value = checker.field_value(&format!("{}.mass", body.name.text), expression, Allowed::Constant)?;
+            let value = checker.expect(value, expression.span, Dimension::MASS, (field.key.span, "`mass`"), SCOPE)?;
+            checker.not_negative(value, expression.span, "a mass")?;
+            Some(value)
+        })
+    }
+
+    fn not_negative(&mut self, value: Typed, span: Span, what: &str) -> Option<()> {
+        match self.graph.constant_value(value.node) {
+            Some(number) if number < 0.0 || !number.is_finite() => {
+                let diagnostic = Diagnostic::error(Code::WRONG_VALUE, format!("{what} cannot be negative"))
+                    .label(span, "below zero");
+                self.fail(diagnostic, SCOPE)
+            }
+            _ => Some(()),
+        }
+    }
+
+    /// Inertia as xx, yy, zz, xy, xz, yz; one number counts for all three axes. Needed where a joint turns the body.
+    fn body_inertia(&mut self, index: usize) -> Option<[Node; 6]> {
+        let declared: &'a Declarations<'a> = self.declared;
+        let body = &declared.bodies[index];
+        let name = &body.name.text;
+        let zero = self.graph.constant(0.0);
+        let Some(field) = find(body.fields, "inertia") else {
+            if self.topology.turns(index) {
+                let diagnostic =
+                    Diagnostic::error(Code::MISSING_INERTIA, format!("body `{name}` can turn but has no inertia"))
+                        .label(body.name.span, "`inertia` is missing")
+                        .help("add `inertia = .. kg*m^2` about its centre of gravity; `0 kg*m^2` for a point mass");
+                return self.fail(diagnostic, SCOPE);
+            }
+            return None;
+        };
+        let path = format!("{name}.inertia");
+        let values = match &field.value {
+            Value::Expression(expression) => {
+                let value = self.component(&path, expression, None, Dimension::INERTIA, field)?;
+                self.not_negative(value, expression.span, "a moment of inertia")?;
+                return Some([value.node, value.node, value.node, zero, zero, zero]);
+            }
+            Value::Tuple(components, _) if components.len() == 3 || components.len() == 6 => {
+                self.tuple(&path, components, &TENSOR, Dimension::INERTIA, field)?
+            }
+            _ => return self.wrong_value(field, "one number, `(Ixx, Iyy, Izz)` or `(Ixx, Iyy, Izz, Ixy, Ixz, Iyz)`"),
+        };
+        let mut inertia = [zero; 6];
+        inertia.iter_mut().zip(values).for_each(|(slot, value)| *slot = value.node);
+        Some(inertia)
+    }
+
+    fn points(&mut self, owner: &str, fields: &'a [Field]) -> Vec<Point> {
+        let zero = self.graph.constant(0.0);
+        let mut points: Vec<Point> = Vec::new();
+        for field in fields {
+            let name = field.key.text.clone();
+            let reserved = ["position", "velocity", "acceleration", "mass", "centre_of_gravity"];
+            if points.iter().any(|point| point.name == name) || reserved.contains(&name.as_str()) {
+                let message = format!("the point name `{name}` is taken");
+                let diagnostic =
+                    Diagnostic::error(Code::DUPLICATE_NAME, message).label(field.key.span, "choose another name");
+                self.report(diagnostic, SCOPE);
+            }
+            let position = self.vector(&format!("{owner}.{name}"), field).unwrap_or([zero; 3]);
+            points.push(Point { name, position });
+        }
+        points
+    }
+
+    fn vector(&mut self, path: &str, field: &'a Field) -> Option<[Node; 3]> {
+        let Value::Tuple(components, _) = &field.value else {
+            return self.wrong_value(field, "three lengths `(x, y, z)`");
+        };
+        if components.len() != 3 {
+            return self.wrong_value(field, "three lengths `(x, y, z)`");
+        }
+        let values = self.tuple(path, components, &AXES, Dimension::LENGTH, field)?;
+        match values.as_slice() {
+            [x, y, z] => Some([x.node, y.node, z.node]),
+            _ => None,
+        }
+    }
+
+    /// Components in brackets; a bare number takes the unit of the next one that has a unit, else of the one before.
+    fn tuple(
+        &mut self,
+        path: &str,
+        components: &'a [Expression],
+        names: &[&str],
+        wanted: Dimension,
+        field: &'a Field,
+    ) -> Option<Vec<Typed>> {
+        let unit_near = |index: usize| {
+            let after = components.iter().skip(index).find_map(written_unit);
+            after.or_else(|| components.iter().take(index).rev().find_map(written_unit))
+        };
+        let values: Vec<Option<Typed>> = components
+            .iter()
+            .zip(names)
+            .enumerate()
+            .map(|(index, (component, name))| {
+                self.component(&format!("{path}.{name}"), component, unit_near(index), wanted, field)
+            })
+            .collect();
+        values.into_iter().collect()
+    }
+
+    fn component(
+        &mut self,
+        path: &str,
+        expression: &'a Expression,
+        hint: Option<&'a crate::syntax::Name>,
+        wanted: Dimension,
+        field: &'a Field,
+    ) -> Option<Typed> {
+        let is_bare = matches!(literal(expression), Some((_, None)));
+        let value = if is_bare && hint.is_some() && !self.parameter_index.contains_key(path) {
+            let value = self.number_with(expression, hint)?;
+            // A zero says that something is not there; freeing it would change the structure.
+            if !self.graph.is_zero(value.node) {
+                self.note_constant(path, expression, hint);
+            }
+            value
+        } else {
+            self.field_value(path, expression, Allowed::Constant)?
+        };
+        let because = format!("`{}`", field.key.text);
+        self.expect(value, expression.span, wanted, (field.key.span, &because), SCOPE)
+    }
+
+    /// What a joint moves must have inertia against that motion.
+    fn check_moving_masses(&mut self) {
+        for joint in 0..self.topology.joints.len() {
+            let Some((kind, _, child)) = self.topology.joints[joint] else { continue };
+            let moved: Vec<usize> = (0..self.bodies.len())
+                .filter(|body| Some(*body) == child.body || self.topology.chain(Some(*body)).contains(&joint))
+                .collect();
+            let is_weightless = |body: &usize| self.graph.is_zero(self.bodies[*body].mass);
+            let has_no_inertia = |body: &usize| self.bodies[*body].inertia.iter().all(|part| self.graph.is_zero(*part));
+            let without = match kind {
+                JointKind::Fixed => false,
+                JointKind::Prismatic { .. } => moved.iter().all(is_weightless),
+                JointKind::Revolute { .. } => moved.iter().all(|body| is_weightless(body) && has_no_inertia(body)),
+            };
+            let body = child.body.map(|index| &self.declared.bodies[index]);
+            if let Some(body) = body.filter(|body| without && find(body.fields, "mass").is_some()) {
+                let name = &self.declared.joints[joint].name;
+                let message = format!("joint `{}` moves nothing that has inertia", name.text);
+                let span = find(body.fields, "mass").map_or(body.name.span, value_span);
+                let diagnostic = Diagnostic::error(Code::NO_INERTIA, message)
+                    .label(span, "the mass is zero")
+                    .secondary(name.span, "moves this body")
+                    .help("give the body a mass, or fix it to its neighbour");
+                self.report(diagnostic, SCOPE);
+            }
+        }
+    }
+
+    /// Position of a point (`None`: the origin) in body axes.
+    pub fn point_of(&mut self, body: usize, point: Option<&str>) -> Option<[Node; 3]> {
+        let zero = self.graph.constant(0.0);
+        match point {
+            None => Some([zero; 3]),
+            Some("centre_of_gravity") => self.bodies.get(body).map(|body| body.centre_of_gravity),
+            Some(name) => {
+                let points = &self.bodies.get(body)?.points;
+                points.iter().find(|point| point.name == name).map(|point| point.position)
+            }
+        }
+    }
+
+    pub fn attachment(&mut self, end: End<'a>) -> Attachment {
+        let zero = self.graph.constant(0.0);
+        let position = match (end.body, end.point) {
+            (Some(body), point) => self.point_of(body, point),
+            (None, Some(name)) => {
+                self.ground_points.iter().find(|point| point.name == name).map(|point| point.position)
+            }
+            (None, None) => None,
+        };
+        Attachment { body: end.body, position: position.unwrap_or([zero; 3]) }
+    }
+
+    /// Position of an attachment in ground axes in the reference configuration, where all axes are parallel.
+    pub fn reference_position(&mut self, attachment: Attachment) -> [Node; 3] {
+        let mut position = attachment.position;
+        for joint in self.topology.chain(attachment.body) {
+            let Some((_, parent, child)) = self.topology.joints[joint] else { continue };
+            let (parent, child) = (self.attachment(parent), self.attachment(child));
+            for axis in 0..3 {
+                let from_child = self.graph.subtract(position[axis], child.position[axis]);
+                position[axis] = self.graph.add(from_child, parent.position[axis]);
+            }
+        }
+        position
+    }
+
+    /// The joints, parents before children.
+    pub fn finished_joints(&mut self) -> Vec<Joint> {
+        let mut joints = Vec::new();
+        for index in self.topology.order.clone() {
+            let Some((kind, parent, child)) = self.topology.joints[index] else { continue };
+            let (parent, child) = (self.attachment(parent), self.attachment(child));
+            let name = &self.declared.joints[index].name;
+            let coordinate = self.joint_symbols[index].map(|(symbols, _)| symbols);
+            joints.push(Joint { name: name.text.clone(), kind, parent, child, coordinate, span: name.span });
+        }
+        joints
+    }
+}

@@ -1,0 +1,446 @@
+//! The declarations that hold for one variant, sorted by what they declare.
+
+use super::load::Loaded;
+use super::names::{Namespace, declare};
+use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
+use crate::syntax::{
+    Change, EffectDeclaration, ElementPlace, ElementRole, Expression, Field, IdentifyLine, Item, ItemKind,
+    LawDeclaration, Lowpass, Name,
+};
+use std::collections::{BTreeMap, HashMap};
+
+/// What the chosen variant declares; borrows the trees.
+#[derive(Default)]
+pub(super) struct Declarations<'a> {
+    pub name: Option<(&'a Name, Option<&'a Name>)>,
+    pub gravity: Option<(&'a Expression, &'a crate::syntax::Direction)>,
+    pub constants: Vec<Constant<'a>>,
+    pub inputs: Vec<Input<'a>>,
+    pub bodies: Vec<Body<'a>>,
+    /// `body ground { point anchor = (..) }`: points fixed in space.
+    pub ground: Option<Body<'a>>,
+    pub joints: Vec<Joint<'a>>,
+    pub forces: Vec<Element<'a>>,
+    pub signals: Vec<Signal<'a>>,
+    pub effects: Vec<Element<'a>>,
+    pub measures: Vec<Measure<'a>>,
+    pub groups: Vec<(&'a Name, &'a [Name])>,
+    pub experiments: Vec<Experiment<'a>>,
+    pub identify: Vec<Identified<'a>>,
+    pub filter: Option<(Option<&'a Lowpass>, bool, Span)>,
+    pub solver: Option<&'a [Field]>,
+    pub laws: HashMap<&'a str, Law<'a>>,
+    /// In order of declaration, the prelude first.
+    pub effect_declarations: Vec<Effect<'a>>,
+    /// Declared names in order, `base` not included.
+    pub variants: Vec<&'a Name>,
+    pub variant: String,
+}
+
+pub(super) struct Constant<'a> {
+    pub name: &'a Name,
+    pub value: &'a Expression,
+}
+
+pub(super) struct Input<'a> {
+    pub name: &'a Name,
+    pub unit: Option<&'a Name>,
+    pub title: Option<&'a Name>,
+    pub fields: &'a [Field],
+}
+
+pub(super) struct Body<'a> {
+    pub name: &'a Name,
+    pub fields: &'a [Field],
+    pub points: &'a [Field],
+}
+
+pub(super) struct Joint<'a> {
+    pub name: &'a Name,
+    pub kind: &'a Name,
+    pub axis: Option<&'a crate::syntax::Direction>,
+    pub parent: &'a Name,
+    pub child: &'a Name,
+    pub fields: &'a [Field],
+}
+
+pub(super) struct Element<'a> {
+    pub role: ElementRole,
+    pub name: &'a Name,
+    pub law: &'a Name,
+    pub place: &'a ElementPlace,
+    pub fields: &'a [Field],
+}
+
+/// A signal by a law or by a formula.
+pub(super) struct Signal<'a> {
+    pub name: &'a Name,
+    pub kind: SignalKind<'a>,
+}
+
+pub(super) enum SignalKind<'a> {
+    Law { law: &'a Name, fields: &'a [Field] },
+    Formula(&'a Expression),
+}
+
+pub(super) struct Measure<'a> {
+    pub name: &'a Name,
+    pub unit: Option<&'a Name>,
+    pub title: Option<&'a Name>,
+    pub value: &'a Expression,
+    pub fields: &'a [Field],
+}
+
+pub(super) struct Experiment<'a> {
+    pub name: &'a Name,
+    pub role: Option<&'a Name>,
+    pub fields: &'a [Field],
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Identified<'a> {
+    pub line: &'a IdentifyLine,
+    /// Written by the variant (or one of its bases), not by the base study.
+    pub by_variant: bool,
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Law<'a> {
+    pub declaration: &'a LawDeclaration,
+    pub is_prelude: bool,
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Effect<'a> {
+    pub declaration: &'a EffectDeclaration,
+    pub documentation: &'a str,
+    pub is_prelude: bool,
+}
+
+struct Variant<'a> {
+    name: &'a Name,
+    base: &'a Name,
+    changes: &'a [Change],
+}
+
+/// Sorts the items of all files and applies `variant` (`None` or `base`: no changes).
+pub(super) fn collect<'a>(
+    loaded: &'a Loaded,
+    variant: Option<&str>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Declarations<'a> {
+    let mut result = Declarations { variant: "base".to_owned(), ..Declarations::default() };
+    let mut items: Vec<(&'a Item, bool)> = Vec::new();
+    let mut variants: Vec<Variant<'a>> = Vec::new();
+    for (tree, is_prelude) in loaded.trees() {
+        for item in &tree.items {
+            match &item.kind {
+                ItemKind::Law(declaration) => add_law(&mut result, declaration, is_prelude, diagnostics),
+                ItemKind::Effect(declaration) => {
+                    add_effect(&mut result, declaration, &item.documentation, is_prelude, diagnostics);
+                }
+                ItemKind::Variant { name, base, changes } => variants.push(Variant { name, base, changes }),
+                ItemKind::Use { .. } => {}
+                _ => items.push((item, false)),
+            }
+        }
+    }
+    check_variants(&variants, diagnostics);
+    result.variants = variants.iter().map(|variant| &variant.name).copied().collect();
+    if let Some(name) = variant.filter(|name| *name != "base") {
+        name.clone_into(&mut result.variant);
+        apply(&variants, name, &mut items, diagnostics);
+    }
+    for (item, by_variant) in items {
+        sort(&mut result, item, by_variant, diagnostics);
+    }
+    check_duplicates(&result, diagnostics);
+    result
+}
+
+fn add_law<'a>(
+    result: &mut Declarations<'a>,
+    declaration: &'a LawDeclaration,
+    is_prelude: bool,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let law = Law { declaration, is_prelude };
+    if let Some(earlier) = result.laws.insert(&declaration.name.text, law) {
+        diagnostics.push(second_declaration("law", &declaration.name, &earlier.declaration.name, earlier.is_prelude));
+    }
+}
+
+fn add_effect<'a>(
+    result: &mut Declarations<'a>,
+    declaration: &'a EffectDeclaration,
+    documentation: &'a str,
+    is_prelude: bool,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let effect = Effect { declaration, documentation, is_prelude };
+    let same = |other: &&mut Effect<'a>| other.declaration.name.text == declaration.name.text;
+    match result.effect_declarations.iter_mut().find(same) {
+        Some(earlier) => {
+            let (name, was_prelude) = (&earlier.declaration.name, earlier.is_prelude);
+            diagnostics.push(second_declaration("effect", &declaration.name, name, was_prelude));
+            *earlier = effect;
+        }
+        None => result.effect_declarations.push(effect),
+    }
+}
+
+fn second_declaration(sort: &str, name: &Name, earlier: &Name, was_prelude: bool) -> Diagnostic {
+    if was_prelude {
+        Diagnostic::remark(Code::OVERRIDES_PRELUDE, format!("{sort} `{}` replaces the one of the prelude", name.text))
+            .label(name.span, "this one is used")
+            .secondary(earlier.span, "the prelude's")
+    } else {
+        Diagnostic::error(Code::DUPLICATE_NAME, format!("{sort} `{}` is declared twice", name.text))
+            .label(name.span, "second declaration")
+            .secondary(earlier.span, "first declaration")
+            .help("rename or remove one of them")
+    }
+}
+
+/// Names of variants are unique and their bases exist and end at `base`, whether or not they are applied.
+fn check_variants(variants: &[Variant<'_>], diagnostics: &mut Vec<Diagnostic>) {
+    let mut seen: HashMap<&str, &Name> = HashMap::new();
+    for variant in variants {
+        if variant.name.text == "base" {
+            let message = "`base` is the study without a variant";
+            diagnostics
+                .push(Diagnostic::error(Code::DUPLICATE_NAME, message).label(variant.name.span, "choose another name"));
+        }
+        if let Some(first) = seen.insert(&variant.name.text, variant.name) {
+            diagnostics.push(second_declaration("variant", variant.name, first, false));
+        }
+        if variant.base.text != "base" && !variants.iter().any(|other| other.name.text == variant.base.text) {
+            diagnostics.push(unknown_variant(&variant.base.text, variants).label(variant.base.span, "not declared"));
+        }
+    }
+    for variant in variants {
+        let (_, cycle) = chain(variants, variant);
+        // Each cycle is reported once, at its member that comes first in the text.
+        if let Some(cycle) = cycle.filter(|cycle| cycle.iter().all(|name| name.span.start >= variant.name.span.start)) {
+            let names: Vec<&str> = cycle.iter().map(|name| name.text.as_str()).collect();
+            let mut diagnostic = Diagnostic::error(
+                Code::CYCLIC_DEFINITION,
+                format!("variants are based on each other: {}", names.join(", ")),
+            )
+            .label(variant.base.span, "leads back to this variant");
+            for name in cycle.iter().filter(|name| name.text != variant.name.text) {
+                diagnostic = diagnostic.secondary(name.span, "on the way");
+            }
+            diagnostics.push(diagnostic.help("one of them must be `of base`"));
+        }
+    }
+}
+
+fn unknown_variant(name: &str, variants: &[Variant<'_>]) -> Diagnostic {
+    let names = || variants.iter().map(|variant| variant.name.text.as_str()).chain(["base"]);
+    let known: Vec<String> = names().map(|name| format!("`{name}`")).collect();
+    Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no variant `{name}`"))
+        .suggest(similar_name(name, names()))
+        .note(format!("declared: {}", known.join(", ")))
+}
+
+/// The variants from `last` down to the one `of base`; and the members of the cycle if there is no end.
+fn chain<'v, 'a>(variants: &'v [Variant<'a>], last: &'v Variant<'a>) -> (Vec<&'v Variant<'a>>, Option<Vec<&'a Name>>) {
+    let mut chain = vec![last];
+    let mut current = last;
+    while let Some(next) = variants.iter().find(|other| other.name.text == current.base.text) {
+        if next.name.text == last.name.text {
+            let cycle = chain.iter().map(|variant| variant.name).collect();
+            return (chain, Some(cycle));
+        }
+        if chain.iter().any(|seen| seen.name.text == next.name.text) {
+            // Runs into a cycle that does not contain `last`; that one is reported at its own members.
+            return (chain, None);
+        }
+        chain.push(next);
+        current = next;
+    }
+    (chain, None)
+}
+
+fn apply<'a>(
+    variants: &[Variant<'a>],
+    name: &str,
+    items: &mut Vec<(&'a Item, bool)>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let Some(chosen) = variants.iter().find(|variant| variant.name.text == name) else {
+        diagnostics.push(unknown_variant(name, variants));
+        return;
+    };
+    let (chain, _) = chain(variants, chosen);
+    for variant in chain.into_iter().rev() {
+        for change in variant.changes {
+            match change {
+                Change::Add(item) => items.push((item, true)),
+                Change::Remove(target) => match position(items, &target.text) {
+                    Some(at) => {
+                        items.remove(at);
+                    }
+                    None => diagnostics.push(nothing_to_change(items, target, "remove")),
+                },
+                Change::Replace(item) => replace(items, item, diagnostics),
+            }
+        }
+    }
+}
+
+fn replace<'a>(items: &mut [(&'a Item, bool)], item: &'a Item, diagnostics: &mut Vec<Diagnostic>) {
+    let Some(name) = declared_name(&item.kind) else {
+        let singleton =
+            |other: &(&Item, bool)| std::mem::discriminant(&other.0.kind) == std::mem::discriminant(&item.kind);
+        match items.iter().position(singleton).filter(|_| !matches!(item.kind, ItemKind::Identify { .. })) {
+            Some(at) => items[at] = (item, true),
+            None => diagnostics.push(
+                Diagnostic::error(Code::UNKNOWN_NAME, "there is nothing to replace")
+                    .label(item.span, "the base has no such declaration")
+                    .help("write `add` instead of `replace`"),
+            ),
+        }
+        return;
+    };
+    match position(items, &name.text) {
+        Some(at) => items[at] = (item, true),
+        None => diagnostics.push(nothing_to_change(items, name, "replace")),
+    }
+}
+
+fn nothing_to_change(items: &[(&Item, bool)], target: &Name, verb: &str) -> Diagnostic {
+    let names = items.iter().filter_map(|(item, _)| declared_name(&item.kind)).map(|name| name.text.as_str());
+    Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no `{}` to {verb}", target.text))
+        .label(target.span, "not in the variant's base")
+        .suggest(similar_name(&target.text, names))
+}
+
+fn position(items: &[(&Item, bool)], name: &str) -> Option<usize> {
+    items.iter().position(|(item, _)| declared_name(&item.kind).is_some_and(|declared| declared.text == name))
+}
+
+/// The name by which `remove` and `replace` find an item.
+fn declared_name(kind: &ItemKind) -> Option<&Name> {
+    match kind {
+        ItemKind::Constant { name, .. }
+        | ItemKind::Input { name, .. }
+        | ItemKind::Body { name, .. }
+        | ItemKind::Joint { name, .. }
+        | ItemKind::Element { name, .. }
+        | ItemKind::Formula { name, .. }
+        | ItemKind::Measure { name, .. }
+        | ItemKind::Group { name, .. }
+        | ItemKind::Experiment { name, .. } => Some(name),
+        _ => None,
+    }
+}
+
+fn sort<'a>(result: &mut Declarations<'a>, item: &'a Item, by_variant: bool, diagnostics: &mut Vec<Diagnostic>) {
+    match &item.kind {
+        ItemKind::Study { name, title } => {
+            once(&mut result.name, (name, title.as_ref()), "study", name.span, diagnostics);
+        }
+        ItemKind::Gravity { value, direction } => {
+            once(&mut result.gravity, (value, direction), "gravity", item.span, diagnostics);
+        }
+        ItemKind::Constant { name, value } => result.constants.push(Constant { name, value }),
+        ItemKind::Input { name, unit, title, fields } => {
+            result.inputs.push(Input { name, unit: unit.as_ref(), title: title.as_ref(), fields });
+        }
+        ItemKind::Body { name, fields, points } if name.text == "ground" => {
+            once(&mut result.ground, Body { name, fields, points }, "body ground", name.span, diagnostics);
+        }
+        ItemKind::Body { name, fields, points } => result.bodies.push(Body { name, fields, points }),
+        ItemKind::Joint { name, kind, axis, parent, child, fields } => {
+            result.joints.push(Joint { name, kind, axis: axis.as_ref(), parent, child, fields });
+        }
+        ItemKind::Element { role, name, law, place, fields } => {
+            let element = Element { role: *role, name, law, place, fields };
+            match role {
+                ElementRole::Force | ElementRole::Actuator => result.forces.push(element),
+                ElementRole::Effect => result.effects.push(element),
+                ElementRole::Signal => result.signals.push(Signal { name, kind: SignalKind::Law { law, fields } }),
+            }
+        }
+        ItemKind::Formula { name, value } => {
+            result.signals.push(Signal { name, kind: SignalKind::Formula(value) });
+        }
+        ItemKind::Measure { name, unit, title, value, fields } => {
+            result.measures.push(Measure { name, unit: unit.as_ref(), title: title.as_ref(), value, fields });
+        }
+        ItemKind::Group { name, members } => result.groups.push((name, members)),
+        ItemKind::Experiment { name, role, fields } => {
+            result.experiments.push(Experiment { name, role: role.as_ref(), fields });
+        }
+        ItemKind::Identify { lines } => add_identified(result, lines, by_variant, diagnostics),
+        ItemKind::Filter { lowpass, remove_mean } => {
+            let filter = (lowpass.as_ref(), *remove_mean, item.span);
+            once(&mut result.filter, filter, "filter", item.span, diagnostics);
+        }
+        ItemKind::Solver { fields } => once(&mut result.solver, fields.as_slice(), "solver", item.span, diagnostics),
+        ItemKind::Law(declaration) => add_law(result, declaration, false, diagnostics),
+        ItemKind::Effect(declaration) => add_effect(result, declaration, &item.documentation, false, diagnostics),
+        // The grammar admits neither inside a variant, and outside they are handled before.
+        ItemKind::Variant { .. } | ItemKind::Use { .. } => {}
+    }
+}
+
+fn once<T>(slot: &mut Option<T>, value: T, what: &str, span: Span, diagnostics: &mut Vec<Diagnostic>) {
+    if slot.is_some() {
+        diagnostics.push(
+            Diagnostic::error(Code::DUPLICATE_NAME, format!("`{what}` is declared twice"))
+                .label(span, "second declaration")
+                .help("a study has one; in a variant write `replace`"),
+        );
+    } else {
+        *slot = Some(value);
+    }
+}
+
+/// A later line for the same target replaces the earlier one if a variant wrote it.
+fn add_identified<'a>(
+    result: &mut Declarations<'a>,
+    lines: &'a [IdentifyLine],
+    by_variant: bool,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    for line in lines {
+        let new = Identified { line, by_variant };
+        match result.identify.iter_mut().find(|earlier| earlier.line.target.text == line.target.text) {
+            Some(earlier) if by_variant => *earlier = new,
+            Some(earlier) => diagnostics.push(
+                Diagnostic::error(Code::DUPLICATE_NAME, format!("`{}` is identified twice", line.target.text))
+                    .label(line.target.span, "second line")
+                    .secondary(earlier.line.target.span, "first line"),
+            ),
+            None => result.identify.push(new),
+        }
+    }
+}
+
+/// Everything that an expression can name shares one namespace; groups and experiments have their own.
+fn check_duplicates(result: &Declarations<'_>, diagnostics: &mut Vec<Diagnostic>) {
+    let mut values: Namespace<'_> = BTreeMap::new();
+    let constants = result.constants.iter().map(|constant| ("constant", constant.name));
+    let inputs = result.inputs.iter().map(|input| ("input", input.name));
+    let bodies = result.bodies.iter().map(|body| ("body", body.name));
+    let joints = result.joints.iter().map(|joint| ("joint", joint.name));
+    let forces = result.forces.iter().map(|force| ("force", force.name));
+    let signals = result.signals.iter().map(|signal| ("signal", signal.name));
+    let effects = result.effects.iter().map(|effect| ("effect", effect.name));
+    let measures = result.measures.iter().map(|measure| ("measure", measure.name));
+    let all = constants.chain(inputs).chain(bodies).chain(joints).chain(forces).chain(signals).chain(effects);
+    for (sort, name) in all.chain(measures) {
+        declare(&mut values, sort, name, diagnostics);
+    }
+    let mut groups: Namespace<'_> = BTreeMap::new();
+    for (name, _) in &result.groups {
+        declare(&mut groups, "group", name, diagnostics);
+    }
+    let mut experiments: Namespace<'_> = BTreeMap::new();
+    for experiment in &result.experiments {
+        declare(&mut experiments, "experiment", experiment.name, diagnostics);
+    }
+}

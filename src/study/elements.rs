@@ -1,0 +1,388 @@
+//! Forces, actuators, signals and effects at their places.
+
+use super::checker::{Allowed, Checker, Entity, Scope, Site};
+use super::declarations::{Declarations, Element, SignalKind};
+use super::evaluate::Typed;
+use super::fields::find;
+use super::instance::{Instance, Progress};
+use super::kinds::{Kinds, coordinate_dimension, load_dimension, rate_dimension};
+use super::model::{ForcePlace, Motion, PlaceKind};
+use crate::diagnostics::{Code, Diagnostic, similar_name};
+use crate::expression::{Node, Symbol, Unary};
+use crate::quantities::{Dimension, Unit};
+use crate::syntax::{Declared, ElementPlace, Field, LawDeclaration, Name};
+
+const SCOPE: Scope = Scope::Study(Allowed::Constant);
+
+/// Where a force stands, by declared joint index, with the symbols of its elongation.
+#[derive(Clone, Copy)]
+pub(super) struct PlacedForce {
+    pub place: ForcePlace,
+    pub motion: Motion,
+    pub coordinate: Symbol,
+    pub rate: Symbol,
+}
+
+impl<'a> Checker<'a> {
+    /// Finds the places of effects, then makes an instance of every law and effect in use.
+    pub fn place_elements(&mut self) {
+        let declared: &'a Declarations<'a> = self.declared;
+        let sites: Vec<Option<(Site, Entity)>> =
+            (0..declared.effects.len()).map(|index| self.effect_site(index)).collect();
+        for (index, element) in declared.forces.iter().enumerate() {
+            let placed = self.force_place(element);
+            self.placed_forces.push(placed);
+            let instance = self.force_instance(index, element, placed);
+            self.force_instances.push(instance);
+        }
+        for (index, signal) in declared.signals.iter().enumerate() {
+            let instance = match &signal.kind {
+                SignalKind::Law { law, fields } => self.signal_instance(index, signal.name, law, fields),
+                SignalKind::Formula(_) => None,
+            };
+            self.signal_instances.push(instance);
+        }
+        for (index, site) in sites.into_iter().enumerate() {
+            let instance = site.and_then(|(site, entity)| self.effect_instance(index, site, entity));
+            self.effect_instances.push(instance);
+        }
+    }
+
+    fn find_law(&mut self, law: &'a Name) -> Option<&'a LawDeclaration> {
+        let declared: &'a Declarations<'a> = self.declared;
+        if let Some(found) = declared.laws.get(law.text.as_str()) {
+            return Some(found.declaration);
+        }
+        let mut names: Vec<&str> = declared.laws.keys().copied().collect();
+        names.sort_unstable();
+        let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no law `{}`", law.text))
+            .label(law.span, "not declared")
+            .suggest(similar_name(&law.text, names.iter().copied()))
+            .note(format!("laws: {}", names.join(", ")));
+        self.fail(diagnostic, SCOPE)
+    }
+
+    fn force_place(&mut self, element: &Element<'a>) -> Option<PlacedForce> {
+        match element.place {
+            ElementPlace::On(name) => self.place_on_joint(element, name),
+            ElementPlace::Between { first, second, along } => {
+                let (a, b) = (self.end(first), self.end(second));
+                let (a, b) = (a?, b?);
+                if a.body == b.body {
+                    let message = format!("`{}` acts between two points of one body", element.name.text);
+                    let diagnostic = Diagnostic::error(Code::SAME_BODY, message)
+                        .label(first.span.to(second.span), "the same body twice");
+                    return self.fail(diagnostic, SCOPE);
+                }
+                let along = match along {
+                    Some(direction) => Some(self.direction(direction)?),
+                    None => self.topology.common_axis(a.body, b.body),
+                };
+                let free_length = find(element.fields, "free_length");
+                let (first, second) = (self.attachment(a), self.attachment(b));
+                let free_length = match (along, free_length) {
+                    (Some(_), Some(field)) => {
+                        let message = format!("`{}` has no free length", element.name.text);
+                        let diagnostic = Diagnostic::error(Code::UNKNOWN_FIELD, message)
+                            .label(field.key.span, "it acts along a fixed axis")
+                            .help("its elongation counts from the reference configuration; use `external_load` for a preload");
+                        return self.fail(diagnostic, SCOPE);
+                    }
+                    (Some(_), None) => None,
+                    (None, field) => Some(self.free_length(element, first, second, field)?),
+                };
+                let coordinate = self.graph.symbol(&format!("{}.elongation", element.name.text));
+                let rate = self.graph.symbol(&format!("{}.rate", element.name.text));
+                let place = ForcePlace::Between { first, second, along, free_length };
+                Some(PlacedForce { place, motion: Motion::Translational, coordinate, rate })
+            }
+            ElementPlace::Nowhere => {
+                let message = format!("`{}` has no place", element.name.text);
+                let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
+                    .label(element.law.span, "acts nowhere")
+                    .help("write `on JOINT` or `A -> B` behind the law");
+                self.fail(diagnostic, SCOPE)
+            }
+        }
+    }
+
+    fn place_on_joint(&mut self, element: &Element<'a>, name: &'a Name) -> Option<PlacedForce> {
+        let entity = self.entities.get(name.text.as_str()).copied();
+        let Some(Entity::Joint(joint)) = entity else { return self.no_joint(name, entity) };
+        let Some((symbols, motion)) = self.joint_symbols.get(joint).copied().flatten() else {
+            if matches!(self.topology.kind(joint), Some(super::model::JointKind::Fixed)) {
+                let message = format!("`{}` stands on a joint that does not move", element.name.text);
+                let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message).label(name.span, "a fixed joint");
+                return self.fail(diagnostic, SCOPE);
+            }
+            return None;
+        };
+        if let Some(field) = find(element.fields, "free_length") {
+            let diagnostic = Diagnostic::error(Code::UNKNOWN_FIELD, "elements on a joint have no free length")
+                .label(field.key.span, "the joint's coordinate counts from the reference configuration");
+            self.report(diagnostic, SCOPE);
+        }
+        let (coordinate, rate) = (symbols.position, symbols.velocity);
+        Some(PlacedForce { place: ForcePlace::Joint(joint), motion, coordinate, rate })
+    }
+
+    fn no_joint<T>(&mut self, name: &'a Name, entity: Option<Entity>) -> Option<T> {
+        let joints = self.declared.joints.iter().map(|joint| joint.name.text.as_str());
+        let similar = similar_name(&name.text, joints);
+        let (code, message) = match entity {
+            Some(_) => (Code::WRONG_PLACE, format!("`{}` is not a joint", name.text)),
+            None => (Code::UNKNOWN_NAME, format!("there is no joint `{}`", name.text)),
+        };
+        let mut diagnostic =
+            Diagnostic::error(code, message).label(name.span, "a joint is needed here").suggest(similar);
+        if matches!(entity, Some(Entity::Body(_))) {
+            diagnostic = diagnostic.help("between bodies write `A -> B`");
+        }
+        self.fail(diagnostic, SCOPE)
+    }
+
+    /// The stated length, or the distance of the points in the reference configuration.
+    fn free_length(
+        &mut self,
+        element: &Element<'a>,
+        first: super::model::Attachment,
+        second: super::model::Attachment,
+        field: Option<&'a Field>,
+    ) -> Option<Node> {
+        if let Some(field) = field {
+            let expression = self.field_expression(field)?;
+            let path = format!("{}.free_length", element.name.text);
+            let value = self.field_value(&path, expression, Allowed::Constant)?;
+            let because = (field.key.span, "`free_length`");
+            return Some(self.expect(value, expression.span, Dimension::LENGTH, because, SCOPE)?.node);
+        }
+        let (a, b) = (self.reference_position(first), self.reference_position(second));
+        let mut sum = self.graph.constant(0.0);
+        for axis in 0..3 {
+            let difference = self.graph.subtract(b[axis], a[axis]);
+            let square = self.graph.multiply(difference, difference);
+            sum = self.graph.add(sum, square);
+        }
+        if self.graph.is_zero(sum) {
+            let message = format!("`{}` joins two points that coincide", element.name.text);
+            let diagnostic = Diagnostic::error(Code::COINCIDENT_POINTS, message)
+                .label(element.name.span, "its direction is not defined")
+                .help("give it a direction (`along z`), a `free_length`, or points that lie apart");
+            return self.fail(diagnostic, SCOPE);
+        }
+        Some(self.graph.unary(Unary::Sqrt, sum))
+    }
+
+    fn force_instance(&mut self, index: usize, element: &Element<'a>, placed: Option<PlacedForce>) -> Option<usize> {
+        let law = self.find_law(element.law);
+        let (law, placed) = (law?, placed?);
+        let site = Site::Force(index);
+        let (x, v) = (self.graph.variable(placed.coordinate), self.graph.variable(placed.rate));
+        let mut place_ports: Vec<(&'a str, Typed)> = vec![
+            ("x", Typed::new(x, coordinate_dimension(placed.motion))),
+            ("v", Typed::new(v, rate_dimension(placed.motion))),
+        ];
+        if let ForcePlace::Joint(joint) = placed.place {
+            place_ports.push(("inertia", self.joint_inertia(joint, placed.motion)?));
+        } else if let Some(port) = law.ports.iter().find(|port| port.name.text == "inertia") {
+            let message = format!("law `{}` needs the inertia that a joint moves", law.name.text);
+            let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
+                .label(element.law.span, "stands between bodies")
+                .secondary(port.name.span, "declared here")
+                .help("let it stand `on JOINT`");
+            return self.fail(diagnostic, SCOPE);
+        }
+        let sort = if element.role == crate::syntax::ElementRole::Actuator { "actuator" } else { "force" };
+        let kinds = Kinds::of(placed.motion);
+        let instance = self.law_instance(law, element.name, sort, site, kinds, place_ports);
+        Some(self.add_instance(instance, element.fields, &["free_length"], element.law))
+    }
+
+    fn joint_inertia(&mut self, joint: usize, motion: Motion) -> Option<Typed> {
+        let (symbols, _) = self.joint_symbols.get(joint).copied().flatten()?;
+        let node = self.graph.variable(symbols.inertia);
+        let acceleration = rate_dimension(motion) / Dimension::TIME;
+        Some(Typed::new(node, load_dimension(motion) / acceleration))
+    }
+
+    fn signal_instance(&mut self, index: usize, name: &'a Name, law: &'a Name, fields: &'a [Field]) -> Option<usize> {
+        let declaration = self.find_law(law)?;
+        let instance =
+            self.law_instance(declaration, name, "signal", Site::Signal(index), Kinds::default(), Vec::new());
+        Some(self.add_instance(instance, fields, &[], law))
+    }
+
+    fn law_instance(
+        &mut self,
+        law: &'a LawDeclaration,
+        name: &'a Name,
+        sort: &'static str,
+        site: Site,
+        kinds: Kinds,
+        place_ports: Vec<(&'a str, Typed)>,
+    ) -> Instance<'a> {
+        let declared: Vec<&'a Declared> = law.ports.iter().chain(&law.parameters).collect();
+        Instance {
+            owner: &name.text,
+            sort,
+            span: name.span,
+            site,
+            step: self.site_effects.get(&site).map_or(0, Vec::len),
+            is_effect: false,
+            declared,
+            bindings: &law.bindings,
+            states: &law.states,
+            fields: Vec::new(),
+            kinds,
+            progress: Progress::Open,
+            place_ports,
+        }
+    }
+
+    /// Where an effect acts; registers it in the chain of that site.
+    fn effect_site(&mut self, index: usize) -> Option<(Site, Entity)> {
+        let declared: &'a Declarations<'a> = self.declared;
+        let element = &declared.effects[index];
+        let ElementPlace::On(name) = element.place else {
+            let diagnostic = Diagnostic::error(Code::WRONG_PLACE, "an effect stands on an element")
+                .label(element.law.span, "no element named")
+                .help("write `on NAME` with the name of a joint, force, actuator, input, measure or signal");
+            return self.fail(diagnostic, SCOPE);
+        };
+        let Some(&entity) = self.entities.get(name.text.as_str()) else {
+            let names = self.all_names();
+            let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no `{}`", name.text))
+                .label(name.span, "not declared")
+                .suggest(similar_name(&name.text, names.iter().copied()));
+            return self.fail(diagnostic, SCOPE);
+        };
+        let site = match entity {
+            Entity::Joint(joint) if self.joint_symbols.get(joint).copied().flatten().is_some() => {
+                Site::JointEffect(index)
+            }
+            Entity::Force(force) => Site::Force(force),
+            Entity::Input(input) => Site::Input(input),
+            Entity::Measure(measure) => Site::Measure(measure),
+            Entity::Signal(signal) => Site::Signal(signal),
+            Entity::Joint(_) | Entity::Constant(_) | Entity::Body(_) | Entity::Effect(_) => {
+                let message = format!("an effect cannot act on `{}`", name.text);
+                let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
+                    .label(name.span, "not a place for effects")
+                    .help("effects act on moving joints, forces, actuators, inputs, measures and signals");
+                return self.fail(diagnostic, SCOPE);
+            }
+        };
+        if self.effect_of(index).is_some() {
+            self.site_effects.entry(site).or_default().push(index);
+        }
+        Some((site, entity))
+    }
+
+    fn effect_instance(&mut self, index: usize, site: Site, entity: Entity) -> Option<usize> {
+        let declared: &'a Declarations<'a> = self.declared;
+        let element = &declared.effects[index];
+        let Some(effect) = self.effect_of(index) else {
+            let names = declared.effect_declarations.iter().map(|effect| effect.declaration.name.text.as_str());
+            let diagnostic =
+                Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no effect `{}`", element.law.text))
+                    .label(element.law.span, "not declared")
+                    .suggest(similar_name(&element.law.text, names));
+            return self.fail(diagnostic, SCOPE);
+        };
+        let motion = self.entity_motion(entity);
+        let mut kinds = motion.map(Kinds::of).unwrap_or_default();
+        if let Some(dimension) = self.declared_value(entity) {
+            kinds = Kinds::of_value(dimension);
+        }
+        self.check_effect_place(index, entity, motion)?;
+        let mut place_ports: Vec<(&'a str, Typed)> = Vec::new();
+        if let (Site::JointEffect(_), Entity::Joint(joint)) = (site, entity) {
+            let (symbols, motion) = self.joint_symbols.get(joint).copied().flatten()?;
+            let (x, v) = (self.graph.variable(symbols.position), self.graph.variable(symbols.velocity));
+            place_ports.push(("x", Typed::new(x, coordinate_dimension(motion))));
+            place_ports.push(("v", Typed::new(v, rate_dimension(motion))));
+            place_ports.push(("inertia", self.joint_inertia(joint, motion)?));
+        }
+        let step = self.site_effects.get(&site).and_then(|chain| chain.iter().position(|other| *other == index));
+        let instance = Instance {
+            owner: &element.name.text,
+            sort: "effect",
+            span: element.name.span,
+            site,
+            step: if matches!(site, Site::JointEffect(_)) { 0 } else { step.unwrap_or(0) },
+            is_effect: true,
+            declared: effect.amplitudes.iter().chain(&effect.shapes).collect(),
+            bindings: &effect.bindings,
+            states: &effect.states,
+            fields: Vec::new(),
+            kinds,
+            progress: Progress::Open,
+            place_ports,
+        };
+        Some(self.add_instance(instance, element.fields, &[], element.law))
+    }
+
+    /// Dimension of an input or measure by its unit.
+    fn declared_value(&self, entity: Entity) -> Option<Dimension> {
+        let unit = match entity {
+            Entity::Input(index) => match self.declared.inputs[index].unit {
+                Some(unit) => unit,
+                None => return Some(Dimension::ONE),
+            },
+            Entity::Measure(index) => self.declared.measures[index].unit?,
+            _ => return None,
+        };
+        Unit::parse(&unit.text).ok().map(|unit| unit.dimension)
+    }
+
+    /// The effect's declaration admits this kind of place.
+    fn check_effect_place(&mut self, index: usize, entity: Entity, motion: Option<Motion>) -> Option<()> {
+        let declared: &'a Declarations<'a> = self.declared;
+        let element = &declared.effects[index];
+        let effect = self.effect_of(index)?;
+        let kind = self.place_kind(entity)?;
+        let word = super::effects::kind_word(kind);
+        let places: Vec<&str> = effect.places.iter().map(|place| place.text.as_str()).collect();
+        let restriction = effect.restriction.as_ref();
+        let span = match element.place {
+            ElementPlace::On(name) => name.span,
+            _ => element.name.span,
+        };
+        if !places.contains(&word) {
+            let message = format!("effect `{}` cannot act on a {word}", effect.name.text);
+            let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
+                .label(span, format!("a {word}"))
+                .secondary(effect.name.span, format!("declared at any {}", places.join(", ")));
+            return self.fail(diagnostic, SCOPE);
+        }
+        let wanted = match restriction.map(|name| name.text.as_str()) {
+            Some("translational") => Some(Motion::Translational),
+            Some("rotational") => Some(Motion::Rotational),
+            _ => None,
+        };
+        if let (Some(wanted), Some(restriction)) = (wanted, restriction)
+            && Some(wanted) != motion
+        {
+            let message = format!("effect `{}` acts on {} places only", effect.name.text, restriction.text);
+            let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
+                .label(span, "not one of them")
+                .secondary(restriction.span, "declared here");
+            return self.fail(diagnostic, SCOPE);
+        }
+        Some(())
+    }
+
+    pub fn place_kind(&self, entity: Entity) -> Option<PlaceKind> {
+        Some(match entity {
+            Entity::Joint(_) => PlaceKind::Joint,
+            Entity::Force(index) => match self.declared.forces[index].role {
+                crate::syntax::ElementRole::Actuator => PlaceKind::Actuator,
+                _ => PlaceKind::Force,
+            },
+            Entity::Input(_) => PlaceKind::Input,
+            Entity::Measure(_) => PlaceKind::Measure,
+            Entity::Signal(_) => PlaceKind::Signal,
+            Entity::Constant(_) | Entity::Body(_) | Entity::Effect(_) => return None,
+        })
+    }
+}

@@ -1,0 +1,114 @@
+//! The texts of a study: the prelude, its file, the files it uses.
+
+use crate::diagnostics::{Code, Diagnostic, Sources, Span};
+use crate::syntax::{ItemKind, Tree, parse};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, LazyLock};
+
+/// Laws and effects that ship with the tool: (name, text).
+const PRELUDE: [(&str, &str); 4] = [
+    ("prelude/laws.ident", include_str!("../../grammar/prelude/laws.ident")),
+    ("prelude/actuators.ident", include_str!("../../grammar/prelude/actuators.ident")),
+    ("prelude/sensors.ident", include_str!("../../grammar/prelude/sensors.ident")),
+    ("prelude/effects.ident", include_str!("../../grammar/prelude/effects.ident")),
+];
+
+/// Parsed texts. Cheap to extend by [`Loaded::with_text`].
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// What the spans of trees and diagnostics point into; the prelude comes first.
+    pub sources: Sources,
+    /// Findings of reading and parsing.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Folder that relative data paths of the study refer to.
+    pub directory: PathBuf,
+    /// One per source.
+    trees: Vec<Arc<Tree>>,
+}
+
+static PRELUDE_LOADED: LazyLock<Loaded> = LazyLock::new(|| {
+    let mut loaded =
+        Loaded { sources: Sources::new(), diagnostics: Vec::new(), directory: PathBuf::new(), trees: Vec::new() };
+    for (name, text) in PRELUDE {
+        loaded.append(name, text);
+    }
+    loaded
+});
+
+/// Reads and parses the study at `path` and the files it uses. Unreadable files and syntax errors are among
+/// [`Loaded::diagnostics`].
+pub fn load(path: &Path) -> Loaded {
+    let mut loaded = PRELUDE_LOADED.clone();
+    loaded.directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    loaded.append_file(path, None, &mut Vec::new());
+    loaded
+}
+
+/// A study given as text; `use` reads files relative to the working directory.
+pub fn load_text(name: &str, text: &str) -> Loaded {
+    let mut loaded = PRELUDE_LOADED.clone();
+    let file = loaded.append(name, text);
+    loaded.append_used(file, Path::new(""), &mut Vec::new());
+    loaded
+}
+
+impl Loaded {
+    /// The same study with the declarations of one more text.
+    pub fn with_text(&self, text: &str) -> Loaded {
+        let mut extended = self.clone();
+        extended.append("extension", text);
+        extended
+    }
+
+    /// Trees in order, and whether each belongs to the prelude.
+    pub fn trees(&self) -> impl Iterator<Item = (&Tree, bool)> {
+        self.trees.iter().enumerate().map(|(index, tree)| (tree.as_ref(), index < PRELUDE.len()))
+    }
+
+    /// Index of the study's own (first) file among [`Loaded::sources`].
+    pub fn study_file(&self) -> u32 {
+        PRELUDE.len() as u32
+    }
+
+    fn append(&mut self, name: &str, text: &str) -> u32 {
+        let file = self.sources.add(name, text);
+        let (tree, diagnostics) = parse(file, text);
+        self.trees.push(Arc::new(tree));
+        self.diagnostics.extend(diagnostics);
+        file
+    }
+
+    /// `seen` holds the canonical paths read so far, so that files may use each other.
+    fn append_file(&mut self, path: &Path, used_at: Option<Span>, seen: &mut Vec<PathBuf>) {
+        let canonical = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+        if seen.contains(&canonical) {
+            return;
+        }
+        seen.push(canonical);
+        match std::fs::read_to_string(path) {
+            Ok(text) => {
+                let file = self.append(&path.display().to_string(), &text);
+                self.append_used(file, path.parent().unwrap_or(Path::new("")), seen);
+            }
+            Err(cause) => {
+                let message = format!("cannot read `{}`: {cause}", path.display());
+                let diagnostic = Diagnostic::error(Code::CANNOT_READ_FILE, message);
+                self.diagnostics.push(match used_at {
+                    Some(span) => diagnostic
+                        .label(span, "used here")
+                        .help("the path is relative to the file that contains the `use` line"),
+                    None => diagnostic,
+                });
+            }
+        }
+    }
+
+    fn append_used(&mut self, file: u32, directory: &Path, seen: &mut Vec<PathBuf>) {
+        let Some(tree) = self.trees.get(file as usize).cloned() else { return };
+        for item in &tree.items {
+            if let ItemKind::Use { path } = &item.kind {
+                self.append_file(&directory.join(&path.text), Some(path.span), seen);
+            }
+        }
+    }
+}

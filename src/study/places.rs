@@ -1,0 +1,110 @@
+//! Everything an effect can attach to, with nodes for its typical magnitudes.
+
+use super::checker::{Checker, Entity, Site};
+use super::kinds::load_dimension;
+use super::model::{Force, ForcePlace, JointKind, Measure, Place, PlaceKind, PlaceQuantity};
+use crate::expression::Node;
+use crate::quantities::Dimension;
+
+impl<'a> Checker<'a> {
+    /// Joints, forces, actuators, inputs, measures, signals; loads of effects are no places.
+    pub fn finished_places(&mut self, forces: &[Force], measures: &[Measure]) -> Vec<Place> {
+        let declared: &'a super::declarations::Declarations<'a> = self.declared;
+        let mut places = Vec::new();
+        for joint in 0..declared.joints.len() {
+            places.extend(self.joint_place(joint, forces));
+        }
+        for force in 0..declared.forces.len() {
+            places.extend(self.force_place_entry(force));
+        }
+        for input in 0..declared.inputs.len() {
+            let span = declared.inputs[input].name.span;
+            let value = self.site_value(Site::Input(input), span);
+            places.extend(value.map(|value| {
+                value_place(PlaceKind::Input, &declared.inputs[input].name.text, value.dimension, value.node)
+            }));
+        }
+        for measure in measures {
+            places.push(value_place(PlaceKind::Measure, &measure.name, measure.unit.dimension, measure.value));
+        }
+        for (index, signal) in declared.signals.iter().enumerate() {
+            let value = self.site_value(Site::Signal(index), signal.name.span);
+            places.extend(
+                value.map(|value| value_place(PlaceKind::Signal, &signal.name.text, value.dimension, value.node)),
+            );
+        }
+        places
+    }
+
+    fn joint_place(&mut self, joint: usize, forces: &[Force]) -> Option<Place> {
+        let (symbols, motion) = self.joint_symbols.get(joint).copied().flatten()?;
+        let position = self.graph.variable(symbols.position);
+        let velocity = self.graph.variable(symbols.velocity);
+        let mut probes = vec![(PlaceQuantity::Coordinate, position), (PlaceQuantity::Rate, velocity)];
+        probes.extend(self.joint_load(joint, forces).map(|load| (PlaceQuantity::Load, load)));
+        let name = self.declared.joints[joint].name.text.clone();
+        let dimension = load_dimension(motion);
+        Some(Place { kind: PlaceKind::Joint, name, motion: Some(motion), dimension, probes })
+    }
+
+    /// Sum of the loads in the joint's direction; `None` where no element can be projected on it.
+    fn joint_load(&mut self, joint: usize, forces: &[Force]) -> Option<Node> {
+        let (kind, _, child) = self.topology.joints.get(joint).copied().flatten()?;
+        let mut sum: Option<Node> = None;
+        for force in forces {
+            let sign = match force.place {
+                ForcePlace::Joint(index) => f64::from(u8::from(self.joint_position(joint) == Some(index))),
+                ForcePlace::Between { first, second, along, .. } => {
+                    let side =
+                        f64::from(u8::from(second.body == child.body)) - f64::from(u8::from(first.body == child.body));
+                    match (kind, along) {
+                        (JointKind::Prismatic { axis }, Some(along)) => side * dot(axis, along),
+                        (JointKind::Prismatic { .. }, None) => side,
+                        _ => 0.0,
+                    }
+                }
+            };
+            if sign != 0.0 {
+                let factor = self.graph.constant(sign);
+                let share = self.graph.multiply(factor, force.load);
+                sum = Some(match sum {
+                    Some(sum) => self.graph.add(sum, share),
+                    None => share,
+                });
+            }
+        }
+        sum
+    }
+
+    /// Index of a declared joint among the finished ones.
+    pub fn joint_position(&self, joint: usize) -> Option<usize> {
+        let present = self.topology.order.iter().filter(|index| self.topology.joints[**index].is_some());
+        present.copied().position(|index| index == joint)
+    }
+
+    fn force_place_entry(&mut self, force: usize) -> Option<Place> {
+        let placed = self.placed_forces.get(force).copied().flatten()?;
+        let declared: &'a super::declarations::Declarations<'a> = self.declared;
+        let element = &declared.forces[force];
+        let kind = self.place_kind(Entity::Force(force))?;
+        let load = self.site_value(Site::Force(force), element.name.span)?;
+        let (x, v) = (self.graph.variable(placed.coordinate), self.graph.variable(placed.rate));
+        let mut probes =
+            vec![(PlaceQuantity::Coordinate, x), (PlaceQuantity::Rate, v), (PlaceQuantity::Load, load.node)];
+        if kind == PlaceKind::Actuator && self.site_port(Site::Force(force), "command").is_some() {
+            let steps = self.site_effects.get(&Site::Force(force)).map_or(0, Vec::len);
+            let command = self.port(Site::Force(force), "command", steps, element.name.span);
+            probes.extend(command.map(|command| (PlaceQuantity::Value, command.node)));
+        }
+        let name = element.name.text.clone();
+        Some(Place { kind, name, motion: Some(placed.motion), dimension: load.dimension, probes })
+    }
+}
+
+fn value_place(kind: PlaceKind, name: &str, dimension: Dimension, value: Node) -> Place {
+    Place { kind, name: name.to_owned(), motion: None, dimension, probes: vec![(PlaceQuantity::Value, value)] }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
