@@ -116,11 +116,13 @@ impl Splitter<'_> {
         let mut open: Vec<usize> = Vec::new();
         let mut wrong: Option<End> = None;
         let mut too_deep: Option<usize> = None;
+        let mut only_documentation = true;
         for at in start..self.tokens.len() {
             let token = &self.tokens[at];
-            if at > start && self.begins_declaration(start, at, open.is_empty(), hasty) {
+            if !only_documentation && self.begins_declaration(start, at, open.is_empty(), hasty) {
                 return self.finish(open.first().copied(), wrong, too_deep, at);
             }
+            only_documentation &= token.kind == TokenKind::Documentation;
             match token.kind {
                 TokenKind::Open(_) => {
                     open.push(at);
@@ -162,11 +164,11 @@ impl Splitter<'_> {
         }
     }
 
-    /// Whether the token at `at` is the first of another declaration than the one that began at `start`.
+    /// Whether the token at `at` is the first of another declaration than the one that began at `start` and has more
+    /// than documentation before `at`.
     fn begins_declaration(&self, start: usize, at: usize, outside_brackets: bool, hasty: bool) -> bool {
         let token = &self.tokens[at];
-        let only_documentation = self.tokens[start..at].iter().all(|token| token.kind == TokenKind::Documentation);
-        if !token.first_on_line || only_documentation {
+        if !token.first_on_line {
             return false;
         }
         let column = self.tokens[start].column;
