@@ -23,7 +23,7 @@ fn read(text: &str) -> Table {
 
 /// Asserts code, line, column and that explanation or help holds `words`.
 fn assert_error(error: DataError, code: Code, line: Option<u64>, column: Option<&str>, words: &str) {
-    assert_eq!((error.code, error.line, error.column.as_deref()), (code, line, column), "{error}");
+    assert_eq!((*error.code, error.line, error.column.as_deref()), (code, line, column), "{error}");
     assert!(error.to_string().contains(words), "`{words}` is not in: {error}");
     assert!(!error.help.is_empty());
 }

@@ -7,7 +7,12 @@
 mod filter;
 mod interpolation;
 mod records;
+mod spectrum;
 
 pub use filter::{Butterworth, FilterError, LowPass, Passes, Prefilter, Section};
 pub use interpolation::Interpolant;
 pub use records::{Column, DataError, Sampling, Table, read_table};
+pub use spectrum::{
+    AutoRegression, PowerSpectrum, autocorrelation, autocovariance, band_shares, cross_correlation, effective_count,
+    ljung_box, periodogram, welch,
+};

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataError {
     /// Kind of finding, one of `Code::DATA_*`.
-    pub code: Code,
+    pub code: &'static Code,
     pub file: PathBuf,
     /// Counted from 1, the head included.
     pub line: Option<u64>,
@@ -19,7 +19,12 @@ pub struct DataError {
 }
 
 impl DataError {
-    pub(super) fn new(code: Code, file: &Path, explanation: impl Into<String>, help: impl Into<String>) -> Self {
+    pub(super) fn new(
+        code: &'static Code,
+        file: &Path,
+        explanation: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Self {
         let (explanation, help) = (explanation.into(), help.into());
         Self { code, file: file.to_path_buf(), line: None, column: None, explanation, help }
     }
@@ -32,7 +37,7 @@ impl DataError {
 
     /// As a finding of the study; `place` marks the words of the study that asked for the data.
     pub fn diagnostic(&self, place: Option<Span>) -> Diagnostic {
-        let finding = Diagnostic::error(self.code, &self.explanation)
+        let finding = Diagnostic::error(*self.code, &self.explanation)
             .data(self.file.display().to_string(), self.line, self.column.as_deref())
             .help(&self.help);
         match place {

@@ -27,7 +27,7 @@ fn unreadable(path: &Path, error: &std::io::Error) -> DataError {
         format!("the data file `{}` cannot be read: {error}", path.display())
     };
     DataError::new(
-        Code::DATA_FILE_UNREADABLE,
+        &Code::DATA_FILE_UNREADABLE,
         path,
         explanation,
         "check the path in the experiment's `data = ...`; `--data DIR` names the folder that holds the data",
@@ -38,7 +38,7 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<String, DataError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") || bytes.contains(&0) {
         return Err(DataError::new(
-            Code::DATA_FILE_UNREADABLE,
+            &Code::DATA_FILE_UNREADABLE,
             path,
             "the data file is not CSV text (UTF-16 or binary)",
             "export it as CSV in UTF-8",
@@ -162,7 +162,7 @@ impl Column {
 
 fn empty(path: &Path, explanation: &str) -> DataError {
     DataError::new(
-        Code::DATA_EMPTY,
+        &Code::DATA_EMPTY,
         path,
         explanation,
         "the file needs a head line `t [s],name [unit],...` and one line of numbers per sample",
@@ -180,7 +180,7 @@ fn ragged(path: &Path, line: u64, found: usize, expected: usize) -> DataError {
 
 fn layout(path: &Path, explanation: String) -> DataError {
     DataError::new(
-        Code::DATA_LAYOUT,
+        &Code::DATA_LAYOUT,
         path,
         explanation,
         "check separators and decimal signs of this line; the file may have been cut while it was written",

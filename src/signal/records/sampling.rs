@@ -56,12 +56,12 @@ impl Table {
     pub fn sampling(&self, time_column: &str) -> Result<Sampling, DataError> {
         let seconds = Unit { symbol: "s".to_owned(), ..Unit::coherent(Dimension::TIME) };
         let times = self.values(time_column, &seconds)?;
-        let place = |code, row: usize, explanation: String, help: &str| {
+        let place = |code: &'static Code, row: usize, explanation: String, help: &str| {
             DataError::new(code, &self.file, explanation, help).at(self.lines.get(row).copied(), Some(time_column))
         };
         if times.len() < 2 {
             return Err(place(
-                Code::DATA_TOO_SHORT,
+                &Code::DATA_TOO_SHORT,
                 0,
                 "the record has one sample only".into(),
                 "a record needs at least two",
@@ -75,7 +75,7 @@ impl Table {
                 format!("time runs backward, from {before} s to {now} s")
             };
             let help = "remove doubled lines; write records that were joined into one file as separate files";
-            return Err(place(Code::DATA_TIME_ORDER, row, explanation, help));
+            return Err(place(&Code::DATA_TIME_ORDER, row, explanation, help));
         }
         self.equidistant(&times, place)
     }
@@ -83,7 +83,7 @@ impl Table {
     fn equidistant(
         &self,
         times: &[f64],
-        place: impl Fn(Code, usize, String, &str) -> DataError,
+        place: impl Fn(&'static Code, usize, String, &str) -> DataError,
     ) -> Result<Sampling, DataError> {
         let last = times.len() - 1;
         let step = (times[last] - times[0]) / last as f64;
@@ -111,7 +111,7 @@ impl Table {
         } else {
             "resample the record to a fixed rate"
         };
-        Err(place(Code::DATA_NOT_UNIFORM, worst + 1, explanation, help))
+        Err(place(&Code::DATA_NOT_UNIFORM, worst + 1, explanation, help))
     }
 
     /// Rows of the window (s; the whole record without one), at least `minimum` of them.
@@ -134,7 +134,7 @@ impl Table {
         };
         let help =
             format!("at least {minimum} are needed; the record runs from {} s to {} s", sampling.start, sampling.end());
-        Err(DataError::new(Code::DATA_TOO_SHORT, &self.file, explanation, help))
+        Err(DataError::new(&Code::DATA_TOO_SHORT, &self.file, explanation, help))
     }
 }
 

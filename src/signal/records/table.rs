@@ -58,7 +58,7 @@ impl Table {
             }
             None => format!("the file has: {}; bind one with `columns = {{ {name} = \"...\" }}`", names.join(", ")),
         };
-        DataError::new(Code::DATA_COLUMN_MISSING, &self.file, format!("there is no column `{name}`"), help)
+        DataError::new(&Code::DATA_COLUMN_MISSING, &self.file, format!("there is no column `{name}`"), help)
             .at(None, Some(name))
     }
 
@@ -78,19 +78,19 @@ impl Table {
     fn defective(&self, column: &Column, defect: &Defect) -> DataError {
         let (code, explanation, help) = if defect.is_number {
             (
-                Code::DATA_NOT_FINITE,
+                &Code::DATA_NOT_FINITE,
                 format!("the sample is `{}`", defect.text),
                 "mend the record or cut it before this line; samples are never made up",
             )
         } else if defect.text.is_empty() {
             (
-                Code::DATA_NOT_A_NUMBER,
+                &Code::DATA_NOT_A_NUMBER,
                 "the cell is empty".to_owned(),
                 "mend the record or cut it before this line; samples are never made up",
             )
         } else {
             (
-                Code::DATA_NOT_A_NUMBER,
+                &Code::DATA_NOT_A_NUMBER,
                 format!("`{}` is not a number", defect.text),
                 "write numbers as 1.5 or 1.5e-3 (1,5 where semicolons separate the columns), without thousands separators or units",
             )
@@ -100,7 +100,7 @@ impl Table {
 
     fn unit_of(&self, column: &Column, wanted: &Unit) -> Result<Unit, DataError> {
         let error = |explanation: String, help: String| {
-            DataError::new(Code::DATA_UNIT, &self.file, explanation, help).at(Some(1), Some(&column.name))
+            DataError::new(&Code::DATA_UNIT, &self.file, explanation, help).at(Some(1), Some(&column.name))
         };
         let Some(text) = &column.unit else {
             if wanted.dimension.is_one() {
@@ -142,7 +142,7 @@ impl Table {
         }
         let value = samples.first().copied().unwrap_or(f64::NAN);
         Err(DataError::new(
-            Code::DATA_CONSTANT,
+            &Code::DATA_CONSTANT,
             &self.file,
             format!("the channel is {value} in all {} samples compared", samples.len()),
             "check the sensor and the column, or choose a window in which something happens",
