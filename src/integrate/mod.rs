@@ -9,6 +9,7 @@ mod bdf;
 mod bdf_history;
 mod choice;
 mod consistent;
+mod equilibrium;
 mod newton;
 mod norm;
 mod problem;
@@ -18,6 +19,7 @@ mod runge_kutta;
 mod stepper;
 mod tsitouras;
 
+pub use equilibrium::{Equilibrium, equilibrium};
 pub use problem::*;
 
 use run::Run;

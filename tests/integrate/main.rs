@@ -1,5 +1,7 @@
 //! The integrators against analytic solutions and published references.
 
+mod equilibrium;
+mod failures;
 mod orders;
 mod problems;
 mod references;

@@ -38,7 +38,7 @@ pub struct System<E> {
 impl<E: Equations> System<E> {
     pub fn new(equations: E, theta: &[f64]) -> Self {
         let n = equations.dimension();
-        let entries: Vec<_> = (0..n).flat_map(|column| (0..n).map(move |row| (row, column))).collect();
+        let entries = structure(&equations, theta);
         Self {
             scale: equations.scale(),
             differential: equations.differential(),
@@ -69,6 +69,21 @@ impl<E: Equations> System<E> {
     fn residual_slope(&self, t: f64, y: &[Dual], y_prime: &[Dual], theta: &[Dual]) -> Vec<f64> {
         self.equations.residual(t, y, y_prime, theta).iter().map(|r| r.slope).collect()
     }
+}
+
+/// Entries of the Jacobian that are not zero at some odd point, and the diagonal.
+fn structure<E: Equations>(equations: &E, theta: &[f64]) -> Vec<(usize, usize)> {
+    let n = equations.dimension();
+    let mut y: Vec<Dual> = (0..n).map(|i| Dual::from(0.3 + 0.1 * (7.0 * i as f64).sin())).collect();
+    let mut y_prime = y.clone();
+    let mut entries: Vec<(usize, usize)> = (0..n).map(|i| (i, i)).collect();
+    for column in 0..n {
+        (y[column].slope, y_prime[column].slope) = (1.0, 0.7);
+        let slopes = equations.residual(0.123, &y, &y_prime, &constants(theta));
+        entries.extend((0..n).filter(|&row| slopes[row].slope != 0.0).map(|row| (row, column)));
+        (y[column].slope, y_prime[column].slope) = (0.0, 0.0);
+    }
+    entries
 }
 
 fn constants(values: &[f64]) -> Vec<Dual> {
@@ -110,7 +125,10 @@ impl<E: Equations> Dynamics for System<E> {
         for column in 0..n {
             y[column].slope = 1.0;
             y_prime[column].slope = c;
-            values[column * n..(column + 1) * n].copy_from_slice(&self.residual_slope(t, &y, &y_prime, &theta));
+            let slopes = self.residual_slope(t, &y, &y_prime, &theta);
+            for entry in self.pattern.starts[column]..self.pattern.starts[column + 1] {
+                values[entry] = slopes[self.pattern.rows[entry]];
+            }
             y[column].slope = 0.0;
             y_prime[column].slope = 0.0;
         }

@@ -1,0 +1,308 @@
+//! States in which nothing changes, and how they depend on the parameters.
+
+use super::problem::{Dynamics, Failure, FailureCause, Work};
+use super::stepper::first_not_finite;
+use crate::linear::SingularValueDecomposition;
+
+const MAXIMUM_ITERATIONS: usize = 200;
+/// Scaled residual that counts as zero ...
+const CONVERGED: f64 = 1e-9;
+/// ... and below which further corrections are rounding.
+const ROUNDING: f64 = 1e-14;
+/// Singular values below this share of the largest mean a direction that the equations do not determine.
+const UNDETERMINED: f64 = 1e-12;
+/// Damping as share of the largest singular value: first value after a failed full step, its growth, and the number of
+/// attempts before giving up.
+const FIRST_DAMPING: f64 = 1e-4;
+const DAMPING_GROWTH: f64 = 10.0;
+const DAMPED_ATTEMPTS: i32 = 14;
+
+/// A state of rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Equilibrium {
+    /// Length n.
+    pub y: Vec<f64>,
+    /// Length n; zero for the components that were sought.
+    pub y_prime: Vec<f64>,
+    /// dy/dtheta, n x p column-major.
+    pub sensitivity: Vec<f64>,
+    pub work: Work,
+}
+
+/// Finds values of the components marked in `unknown` (length n) for which their equations hold with `y' = 0`, starting
+/// from `y`; the other components keep their values, whose derivatives with respect to the parameters stand in
+/// `sensitivity` (n x p column-major; rows of unknowns are ignored).
+///
+/// The equation of an unknown component is its row of F. Where that row holds no unknown (a position whose velocity is
+/// given), the rows of the components it does hold take its place (the acceleration of that position).
+///
+/// Method: Newton steps on the equations scaled by the typical magnitudes, damped as in Levenberg-Marquardt where a full
+/// step does not reduce the residual (More-1978). Sensitivities follow from the implicit function theorem.
+///
+/// # Errors
+///
+/// [`FailureCause::NoEquilibrium`] naming the component whose equation cannot be satisfied, or the component that the
+/// equations leave undetermined (free to move without stiffness); [`FailureCause::NotFinite`] where the model cannot be
+/// evaluated at the start.
+pub fn equilibrium<D: Dynamics + ?Sized>(
+    dynamics: &mut D,
+    t: f64,
+    y: &[f64],
+    sensitivity: &[f64],
+    unknown: &[bool],
+) -> Result<Equilibrium, Failure> {
+    let n = dynamics.dimension();
+    let complete = y.len() == n && unknown.len() == n && sensitivity.len() == n * dynamics.parameter_count();
+    if !complete {
+        return Err(fail(t, FailureCause::InvalidRequest, None, Work::default()));
+    }
+    let mut search = Search::new(dynamics, t, y, unknown);
+    if search.unknowns.is_empty() {
+        let (y, sensitivity) = (y.to_vec(), sensitivity.to_vec());
+        return Ok(Equilibrium { y_prime: vec![0.0; n], y, sensitivity, work: search.work });
+    }
+    match search.solve().and_then(|()| search.sensitivity(sensitivity)) {
+        Ok(sensitivity) => Ok(Equilibrium { y: search.y, y_prime: vec![0.0; n], sensitivity, work: search.work }),
+        Err((cause, component)) => Err(fail(t, cause, component, search.work)),
+    }
+}
+
+fn fail(time: f64, cause: FailureCause, component: Option<usize>, work: Work) -> Failure {
+    Failure { time, cause, component, work: Box::new(work) }
+}
+
+type Outcome<T> = Result<T, (FailureCause, Option<usize>)>;
+
+struct Search<'d, D: ?Sized> {
+    dynamics: &'d mut D,
+    t: f64,
+    y: Vec<f64>,
+    unknowns: Vec<usize>,
+    /// Equations used.
+    rows: Vec<usize>,
+    /// Typical magnitude of each unknown.
+    scale: Vec<f64>,
+    zero: Vec<f64>,
+    work: Work,
+}
+
+/// The linearised equations at a point, scaled to rows of magnitude one.
+struct Linearisation {
+    decomposition: SingularValueDecomposition,
+    /// dF/dy, all rows and columns, dense column-major.
+    matrix: Vec<f64>,
+    /// 1 / largest effect of an unknown on each row.
+    row_factor: Vec<f64>,
+}
+
+impl<'d, D: Dynamics + ?Sized> Search<'d, D> {
+    fn new(dynamics: &'d mut D, t: f64, y: &[f64], unknown: &[bool]) -> Self {
+        let n = y.len();
+        let unknowns: Vec<usize> = (0..n).filter(|&i| unknown[i]).collect();
+        let rows = equations(dynamics, t, y, unknown);
+        let scale = unknowns.iter().map(|&i| dynamics.scale()[i]).collect();
+        let work = Work { method: "Newton", ..Work::default() };
+        Self { dynamics, t, y: y.to_vec(), unknowns, rows, scale, zero: vec![0.0; n], work }
+    }
+
+    fn residual(&mut self, y: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; y.len()];
+        self.work.residuals += 1;
+        self.dynamics.residual(self.t, y, &self.zero, &mut all);
+        self.rows.iter().map(|&row| all[row]).collect()
+    }
+
+    fn linearise(&mut self) -> Outcome<Linearisation> {
+        let n = self.y.len();
+        let mut values = vec![0.0; self.dynamics.pattern().len()];
+        self.work.jacobians += 1;
+        self.dynamics.jacobian(self.t, &self.y, &self.zero, 0.0, &mut values);
+        let pattern = self.dynamics.pattern();
+        if let Some(entry) = first_not_finite(&values) {
+            return Err((FailureCause::NotFinite, Some(pattern.rows[entry])));
+        }
+        let mut matrix = vec![0.0; n * n];
+        for column in 0..n {
+            for entry in pattern.starts[column]..pattern.starts[column + 1] {
+                matrix[column * n + pattern.rows[entry]] = values[entry];
+            }
+        }
+        let effect = |row: usize, k: usize| matrix[self.unknowns[k] * n + row] * self.scale[k];
+        let row_factor: Vec<f64> = self
+            .rows
+            .iter()
+            .map(|&row| {
+                let largest = (0..self.unknowns.len()).fold(0.0f64, |a, k| a.max(effect(row, k).abs()));
+                if largest > 0.0 { 1.0 / largest } else { 1.0 }
+            })
+            .collect();
+        let scaled: Vec<f64> = (0..self.unknowns.len())
+            .flat_map(|k| self.rows.iter().zip(&row_factor).map(move |(&row, factor)| (row, k, factor)))
+            .map(|(row, k, factor)| effect(row, k) * factor)
+            .collect();
+        self.work.factorisations += 1;
+        let decomposition = SingularValueDecomposition::new(self.rows.len(), self.unknowns.len(), &scaled)
+            .map_err(|_| (FailureCause::NoEquilibrium, None))?;
+        Ok(Linearisation { decomposition, matrix, row_factor })
+    }
+
+    fn solve(&mut self) -> Outcome<()> {
+        let mut residual = self.residual(&self.y.clone());
+        if let Some(row) = first_not_finite(&residual) {
+            return Err((FailureCause::NotFinite, Some(self.rows[row])));
+        }
+        for _ in 0..MAXIMUM_ITERATIONS {
+            let linearisation = self.linearise()?;
+            let size = linearisation.size(&residual);
+            if size <= ROUNDING {
+                return self.refuse_undetermined(&linearisation);
+            }
+            match self.improve(&linearisation, &residual, size) {
+                Some((y, better)) => {
+                    self.y = y;
+                    residual = better;
+                }
+                None if size <= CONVERGED => return self.refuse_undetermined(&linearisation),
+                None => return Err((FailureCause::NoEquilibrium, Some(self.worst(&linearisation, &residual)))),
+            }
+        }
+        let linearisation = self.linearise()?;
+        if linearisation.size(&residual) <= CONVERGED {
+            return self.refuse_undetermined(&linearisation);
+        }
+        Err((FailureCause::NoEquilibrium, Some(self.worst(&linearisation, &residual))))
+    }
+
+    /// A point with a smaller residual, by a full or damped step.
+    fn improve(&mut self, linearisation: &Linearisation, residual: &[f64], size: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+        let largest = linearisation.decomposition.singular_values[0];
+        for attempt in 0..DAMPED_ATTEMPTS {
+            let damping = if attempt == 0 { 0.0 } else { FIRST_DAMPING * DAMPING_GROWTH.powi(attempt - 1) * largest };
+            let step = linearisation.step(residual, damping);
+            let mut y = self.y.clone();
+            for ((&i, scale), step) in self.unknowns.iter().zip(&self.scale).zip(&step) {
+                y[i] -= scale * step;
+            }
+            let new = self.residual(&y);
+            // What is not a number is no improvement either.
+            if linearisation.size(&new) < size {
+                return Some((y, new));
+            }
+        }
+        None
+    }
+
+    /// Component whose equation has the largest scaled residual.
+    fn worst(&self, linearisation: &Linearisation, residual: &[f64]) -> usize {
+        let size = |k: usize| (residual[k] * linearisation.row_factor[k]).abs();
+        let worst = (0..self.rows.len()).max_by(|&a, &b| size(a).total_cmp(&size(b)));
+        worst.map_or(self.unknowns[0], |k| self.rows[k])
+    }
+
+    fn refuse_undetermined(&self, linearisation: &Linearisation) -> Outcome<()> {
+        let decomposition = &linearisation.decomposition;
+        let rank = decomposition.rank(UNDETERMINED);
+        if rank == self.unknowns.len() {
+            return Ok(());
+        }
+        // With fewer equations than unknowns the thin decomposition has no vector for the missing directions.
+        let component = (rank < decomposition.singular_values.len()).then(|| {
+            let direction = decomposition.right(rank);
+            let largest = (0..direction.len()).max_by(|&a, &b| direction[a].abs().total_cmp(&direction[b].abs()));
+            largest.map(|k| self.unknowns[k])
+        });
+        Err((FailureCause::NoEquilibrium, component.flatten()))
+    }
+
+    /// `dF/dy_unknown S_unknown = -(dF/dtheta + dF/dy_known S_known)`.
+    fn sensitivity(&mut self, given: &[f64]) -> Outcome<Vec<f64>> {
+        let (n, p) = (self.y.len(), self.dynamics.parameter_count());
+        let mut sensitivity = given.to_vec();
+        if p == 0 {
+            return Ok(sensitivity);
+        }
+        let linearisation = self.linearise()?;
+        let mut by_parameter = vec![0.0; n * p];
+        self.dynamics.parameter_derivative(self.t, &self.y, &self.zero, &mut by_parameter);
+        for (column, by_parameter) in sensitivity.chunks_exact_mut(n).zip(by_parameter.chunks_exact(n)) {
+            for &i in &self.unknowns {
+                column[i] = 0.0;
+            }
+            let right: Vec<f64> = self
+                .rows
+                .iter()
+                .map(|&row| {
+                    by_parameter[row] + (0..n).map(|i| linearisation.matrix[i * n + row] * column[i]).sum::<f64>()
+                })
+                .collect();
+            let step = linearisation.step(&right, 0.0);
+            for ((&i, scale), step) in self.unknowns.iter().zip(&self.scale).zip(&step) {
+                column[i] = -scale * step;
+            }
+        }
+        match first_not_finite(&sensitivity) {
+            Some(place) => Err((FailureCause::NotFinite, Some(place % n))),
+            None => Ok(sensitivity),
+        }
+    }
+}
+
+impl Linearisation {
+    /// Largest scaled residual; the scale of the matrix at this point, so that points are compared by one measure.
+    fn size(&self, residual: &[f64]) -> f64 {
+        let sum: f64 = residual.iter().zip(&self.row_factor).map(|(r, factor)| (r * factor) * (r * factor)).sum();
+        if sum.is_finite() { sum.sqrt() } else { f64::INFINITY }
+    }
+
+    /// Damped least-squares solution of `A step = residual` in scaled unknowns.
+    fn step(&self, residual: &[f64], damping: f64) -> Vec<f64> {
+        let decomposition = &self.decomposition;
+        let values = &decomposition.singular_values;
+        let mut step = vec![0.0; decomposition.right(0).len()];
+        for (k, &value) in values.iter().enumerate() {
+            if value <= UNDETERMINED * values[0] {
+                break;
+            }
+            let left = decomposition.left(k);
+            let share: f64 =
+                left.iter().zip(residual).zip(&self.row_factor).map(|((u, r), factor)| u * r * factor).sum();
+            let factor = share * value / (value * value + damping * damping);
+            step.iter_mut().zip(decomposition.right(k)).for_each(|(s, v)| *s += factor * v);
+        }
+        step
+    }
+}
+
+/// Rows of F that determine the unknown components.
+fn equations<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64], unknown: &[bool]) -> Vec<usize> {
+    let n = unknown.len();
+    let mut values = vec![0.0; dynamics.pattern().len()];
+    dynamics.jacobian(t, y, &vec![0.0; n], 0.0, &mut values);
+    let pattern = dynamics.pattern();
+    // Per row: whether it holds an unknown, and the given components it holds.
+    let mut holds_unknown = vec![false; n];
+    let mut given: Vec<Vec<usize>> = vec![Vec::new(); n];
+    for column in 0..n {
+        for entry in pattern.starts[column]..pattern.starts[column + 1] {
+            let row = pattern.rows[entry];
+            // The diagonal is always there, for the derivative; only its value tells whether the row holds y itself.
+            if row == column && values[entry] == 0.0 {
+                continue;
+            }
+            if unknown[column] {
+                holds_unknown[row] = true;
+            } else if row != column {
+                given[row].push(column);
+            }
+        }
+    }
+    let mut used = vec![false; n];
+    for i in (0..n).filter(|&i| unknown[i]) {
+        if holds_unknown[i] || given[i].is_empty() {
+            used[i] = true;
+        } else {
+            given[i].iter().for_each(|&j| used[j] = true);
+        }
+    }
+    (0..n).filter(|&row| used[row]).collect()
+}
