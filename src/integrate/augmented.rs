@@ -27,9 +27,7 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
         let n = dynamics.dimension();
         let p = if with_sensitivities { dynamics.parameter_count() } else { 0 };
         let pattern = dynamics.pattern();
-        let jacobian_rows = pattern.rows.clone();
-        let jacobian_columns: Vec<usize> =
-            (0..n).flat_map(|j| std::iter::repeat_n(j, pattern.starts[j + 1] - pattern.starts[j])).collect();
+        let (jacobian_rows, jacobian_columns): (Vec<usize>, Vec<usize>) = pattern.entries().unzip();
         let parameter_places: Vec<usize> = match dynamics.parameter_pattern() {
             Some(pattern) if p > 0 => (0..p)
                 .flat_map(|j| pattern.rows[pattern.starts[j]..pattern.starts[j + 1]].iter().map(move |row| row * p + j))

@@ -122,10 +122,8 @@ impl<'d, D: Dynamics + ?Sized> Search<'d, D> {
             return Err((FailureCause::NotFinite, Some(pattern.rows[entry])));
         }
         let mut matrix = vec![0.0; n * n];
-        for column in 0..n {
-            for entry in pattern.starts[column]..pattern.starts[column + 1] {
-                matrix[column * n + pattern.rows[entry]] = values[entry];
-            }
+        for ((row, column), &value) in pattern.entries().zip(&values) {
+            matrix[column * n + row] = value;
         }
         let effect = |row: usize, k: usize| matrix[self.unknowns[k] * n + row] * self.scale[k];
         let row_factor: Vec<f64> = self
@@ -282,18 +280,15 @@ fn equations<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64], unknown:
     // Per row: whether it holds an unknown, and the given components it holds.
     let mut holds_unknown = vec![false; n];
     let mut given: Vec<Vec<usize>> = vec![Vec::new(); n];
-    for column in 0..n {
-        for entry in pattern.starts[column]..pattern.starts[column + 1] {
-            let row = pattern.rows[entry];
-            // The diagonal is always there, for the derivative; only its value tells whether the row holds y itself.
-            if row == column && values[entry] == 0.0 {
-                continue;
-            }
-            if unknown[column] {
-                holds_unknown[row] = true;
-            } else if row != column {
-                given[row].push(column);
-            }
+    for ((row, column), &value) in pattern.entries().zip(&values) {
+        // The diagonal is always there, for the derivative; only its value tells whether the row holds y itself.
+        if row == column && value == 0.0 {
+            continue;
+        }
+        if unknown[column] {
+            holds_unknown[row] = true;
+        } else if row != column {
+            given[row].push(column);
         }
     }
     let mut used = vec![false; n];

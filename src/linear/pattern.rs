@@ -28,6 +28,12 @@ impl SparsityPattern {
         Self { row_count, column_count, starts, rows }
     }
 
+    /// (row, column) of every entry, in the order of the values.
+    pub fn entries(&self) -> impl Iterator<Item = (usize, usize)> {
+        let column_of = self.starts.windows(2).enumerate().flat_map(|(j, w)| std::iter::repeat_n(j, w[1] - w[0]));
+        self.rows.iter().copied().zip(column_of)
+    }
+
     pub fn len(&self) -> usize {
         self.rows.len()
     }
