@@ -1,10 +1,11 @@
 //! The answer of a diagnosis, as data. Everything a report shows is in here.
 
 use crate::identify::Identification;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// What is wrong, why, and what the extension gains.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct Answer {
     pub study: String,
     pub title: String,
@@ -30,7 +31,7 @@ pub struct Answer {
     pub simulations: usize,
 }
 
-#[derive(Clone, Debug, Serialize, PartialEq)]
+#[derive(Clone, Debug, JsonSchema, Serialize, PartialEq)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     NothingWrongFound,
@@ -41,7 +42,7 @@ pub enum Verdict {
 }
 
 /// The residual of one channel of one record, taken apart.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct ChannelAnatomy {
     pub experiment: String,
     pub channel: String,
@@ -59,7 +60,7 @@ pub struct ChannelAnatomy {
 }
 
 /// The force that the model lacks at a place, estimated from the residual, over the place's motion.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct MissingForce {
     pub place: String,
     /// `N` or `N*m`.
@@ -78,7 +79,7 @@ pub struct MissingForce {
 }
 
 /// One round: screen, refit, judge.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct Step {
     /// Candidates screened, best first.
     pub ranking: Vec<Candidate>,
@@ -92,7 +93,7 @@ pub struct Step {
     pub judgement: String,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct Candidate {
     /// `dry_friction at slide`, `slide.mass set free`.
     pub name: String,
@@ -114,7 +115,7 @@ pub struct Candidate {
     pub smallest_detectable: Option<String>,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct Refit {
     pub estimation_discrepancy: f64,
     pub validation_discrepancy: Option<f64>,

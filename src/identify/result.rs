@@ -1,9 +1,10 @@
 //! What an identification found. Values of parameters and channels are in the unit the study wrote; times in s.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// One variant of a study fitted to its estimation records, and evaluated on all of them.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct Identification {
     pub variant: String,
     pub parameters: Vec<ParameterEstimate>,
@@ -37,7 +38,7 @@ pub struct Identification {
     pub remarks: Vec<String>,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct ParameterEstimate {
     pub name: String,
     pub unit: String,
@@ -55,7 +56,7 @@ pub struct ParameterEstimate {
 }
 
 /// One record with the model's answer to it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct RecordFit {
     pub experiment: String,
     /// `estimation`, `validation` or `test`.
@@ -67,7 +68,7 @@ pub struct RecordFit {
     pub discrepancy: DiscrepancyNode,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct ChannelFit {
     pub name: String,
     pub title: String,
@@ -85,7 +86,7 @@ pub struct ChannelFit {
     pub noise_source: String,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct DiscrepancyNode {
     pub name: String,
     /// %

@@ -1,0 +1,49 @@
+//! Reports for a terminal: the verdict first, then what supports it; at most about 100 columns.
+//!
+//! *In*: results. *Out*: text ending in a newline. *Must not happen here*: asking what kind of terminal it is (the
+//! caller says [`Colour`]), progress.
+
+mod answer;
+mod identification;
+mod sheet;
+mod table;
+
+use crate::diagnose::Answer;
+use crate::identify::Identification;
+
+/// Whether to emphasise with ANSI sequences.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Colour {
+    Never,
+    Always,
+}
+
+/// The answer of a diagnosis, without colours.
+pub fn answer(answer: &Answer) -> String {
+    answer_in(answer, Colour::Never)
+}
+
+/// The answer of a diagnosis.
+pub fn answer_in(answer: &Answer, colour: Colour) -> String {
+    answer::text(answer, colour)
+}
+
+/// The result of a fit, without colours.
+pub fn identification(fit: &Identification) -> String {
+    identification_in(fit, Colour::Never)
+}
+
+/// The result of a fit.
+pub fn identification_in(fit: &Identification, colour: Colour) -> String {
+    identification::text(fit, colour)
+}
+
+/// Variants side by side, without colours.
+pub fn comparison(variants: &[Identification]) -> String {
+    comparison_in(variants, Colour::Never)
+}
+
+/// Variants side by side; the first one is the base to which differences refer.
+pub fn comparison_in(variants: &[Identification], colour: Colour) -> String {
+    identification::comparison(variants, colour)
+}

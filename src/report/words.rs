@@ -1,0 +1,91 @@
+//! Wording shared by all forms of a report.
+
+use crate::diagnose::{Answer, Candidate, Refit, Step, Verdict};
+use crate::identify::{Identification, RecordFit};
+use crate::report::number;
+
+/// Correlations of estimates from here on are pointed out.
+pub const STRONG_CORRELATION: f64 = 0.9;
+
+/// The verdict as a heading.
+pub fn verdict(verdict: &Verdict) -> &'static str {
+    match verdict {
+        Verdict::NothingWrongFound => "Nothing wrong found",
+        Verdict::CauseNamed => "Cause named",
+        Verdict::GroupOfCauses => "Group of causes that cannot be told apart",
+        Verdict::ShapeWithoutName => "A missing force whose cause is not in the catalogue",
+        Verdict::CannotBeJudged => "Cannot be judged with this data",
+    }
+}
+
+/// The role of a record as a reader understands it.
+pub fn role(role: &str) -> &str {
+    match role {
+        "validation" => "validation (held out)",
+        "test" => "test (looked at once)",
+        other => other,
+    }
+}
+
+/// The accepted candidates of all rounds, in order.
+pub fn accepted(answer: &Answer) -> Vec<(&Step, &Candidate)> {
+    let of_step = |step| -> Option<(&Step, &Candidate)> {
+        let step: &Step = step;
+        Some((step, step.ranking.get(step.accepted?)?))
+    };
+    answer.steps.iter().filter_map(of_step).collect()
+}
+
+/// The record of `other` that stands for the same measurement as `record`.
+pub fn counterpart<'a>(record: &RecordFit, other: &'a Identification) -> Option<&'a RecordFit> {
+    other.records.iter().find(|candidate| {
+        candidate.experiment == record.experiment && candidate.file == record.file && candidate.role == record.role
+    })
+}
+
+/// Pairs of parameters whose estimates move together: (first, second, correlation), strongest first.
+pub fn strong_correlations(fit: &Identification) -> Vec<(&str, &str, f64)> {
+    let mut pairs = Vec::new();
+    for (row, first) in fit.parameters.iter().enumerate() {
+        for (column, second) in fit.parameters.iter().enumerate().skip(row + 1) {
+            let correlation = fit.correlation.get(row).and_then(|line| line.get(column)).copied().unwrap_or(0.0);
+            if correlation.abs() >= STRONG_CORRELATION {
+                pairs.push((first.name.as_str(), second.name.as_str(), correlation));
+            }
+        }
+    }
+    pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    pairs
+}
+
+/// 95 % interval of the relative change of the held-out error, as `-70 .. -64 %`.
+pub fn held_out_change(refit: &Refit) -> Option<String> {
+    let (low, high) = refit.validation_change?;
+    let decimals = usize::from((high - low).abs() < 10.0);
+    Some(format!("{} .. {} %", number::fixed(low, decimals), number::fixed(high, decimals)))
+}
+
+/// How a candidate fared in its round: `accepted`, `not told apart`, its objection, or nothing.
+pub fn standing(step: &Step, index: usize) -> String {
+    let Some(candidate) = step.ranking.get(index) else { return String::new() };
+    if step.accepted == Some(index) {
+        return "accepted".into();
+    }
+    let objection = candidate.refit.as_ref().and_then(|refit| refit.objection.clone());
+    let in_group = step.indistinguishable.len() > 1 && step.indistinguishable.contains(&candidate.name);
+    match (in_group, objection) {
+        (true, _) => "cannot be told apart".into(),
+        (false, Some(objection)) => objection,
+        (false, None) => String::new(),
+    }
+}
+
+/// `before -> after` change in per cent of the value before.
+pub fn relative_change(before: f64, after: f64) -> Option<f64> {
+    (before > 0.0 && before.is_finite() && after.is_finite()).then(|| 100.0 * (after / before - 1.0))
+}
+
+/// The command that writes the extension into the study's folder.
+pub fn next_step(answer: &Answer) -> Option<String> {
+    answer.extension.as_ref().map(|_| format!("ident diagnose {} --write", answer.study))
+}
