@@ -67,7 +67,7 @@ fn assert_sound(page: &str) {
     assert_well_formed(page);
     assert!(page.len() < LIMIT, "{} bytes", page.len());
     let markup = page.split("<script").next().unwrap();
-    assert!(!markup.contains("NaN") && !markup.contains(">inf"), "non-finite numbers are named in words");
+    assert!(!markup.contains("NaN") && !markup.contains(">inf<"), "non-finite numbers are named in words");
 }
 
 #[test]
@@ -176,4 +176,21 @@ fn many_long_records_are_thinned_and_the_page_says_so() {
     let page = page::answer(&answer).unwrap();
     assert_sound(&page);
     assert!(page.contains("drawn from the minimum and maximum of every"));
+}
+
+#[test]
+fn picture_of_a_diagnosis_stands_alone() {
+    for (name, answer) in
+        [("drive_axis.svg", synthetic::drive_axis()), ("quarter_vehicle.svg", synthetic::quarter_vehicle())]
+    {
+        let picture = ident::report::figure::summary(&answer);
+        kept(name, &picture);
+        assert!(picture.starts_with("<svg xmlns=") && picture.len() < 200_000, "{} bytes", picture.len());
+        assert_well_formed(&picture);
+        // The name space is an identifier, nothing is fetched.
+        assert_eq!(picture.matches("http").count(), 1);
+        for part in ["missing force [N]", "velocity [m/s]", "residual [", "held-out discrepancy"] {
+            assert!(picture.contains(part), "{name} shows {part}");
+        }
+    }
 }

@@ -14,6 +14,7 @@
 
 pub mod chart;
 
+pub mod figure;
 pub mod json;
 pub mod number;
 pub mod page;

@@ -44,24 +44,26 @@ pub enum Mark<'a> {
     Line { x: Cow<'a, [f64]>, y: Cow<'a, [f64]>, style: Style, name: &'a str },
     /// Points, darker where many lie on each other.
     Cloud { x: Cow<'a, [f64]>, y: Cow<'a, [f64]>, style: Style, name: &'a str },
+    /// A few points as open circles.
+    Circles { x: Cow<'a, [f64]>, y: Cow<'a, [f64]>, style: Style, name: &'a str },
 }
 
 impl Mark<'_> {
     fn data(&self) -> (&[f64], &[f64]) {
         match self {
-            Mark::Line { x, y, .. } | Mark::Cloud { x, y, .. } => (x, y),
+            Mark::Line { x, y, .. } | Mark::Cloud { x, y, .. } | Mark::Circles { x, y, .. } => (x, y),
         }
     }
 
     fn name(&self) -> &str {
         match self {
-            Mark::Line { name, .. } | Mark::Cloud { name, .. } => name,
+            Mark::Line { name, .. } | Mark::Cloud { name, .. } | Mark::Circles { name, .. } => name,
         }
     }
 
     fn style(&self) -> Style {
         match self {
-            Mark::Line { style, .. } | Mark::Cloud { style, .. } => *style,
+            Mark::Line { style, .. } | Mark::Cloud { style, .. } | Mark::Circles { style, .. } => *style,
         }
     }
 }
@@ -123,6 +125,7 @@ impl Plot<'_> {
             match mark {
                 Mark::Line { x, y, style, .. } => draw_line(&frame, x, y, *style, &mut svg),
                 Mark::Cloud { x, y, style, .. } => draw_cloud(&frame, x, y, *style, &mut svg),
+                Mark::Circles { x, y, style, .. } => draw_circles(&frame, x, y, *style, &mut svg),
             }
         }
         if self.legend {
@@ -226,6 +229,10 @@ impl Plot<'_> {
                 Mark::Line { .. } => {
                     push(svg, format_args!("<path class=\"line key {class}\" d=\"M{} 14h18\"/>", pixel(at)))
                 }
+                Mark::Circles { .. } => push(
+                    svg,
+                    format_args!("<circle class=\"ring {class}\" cx=\"{}\" cy=\"14\" r=\"3\"/>", pixel(at + 9.0)),
+                ),
                 Mark::Cloud { .. } => push(
                     svg,
                     format_args!("<circle class=\"dot {class}\" cx=\"{}\" cy=\"14\" r=\"3.5\"/>", pixel(at + 9.0)),
@@ -261,21 +268,48 @@ fn draw_line(frame: &Frame, x: &[f64], y: &[f64], style: Style, svg: &mut String
     push(svg, format_args!("<path class=\"line {}\" d=\"{path}\"/>", style.class()));
 }
 
+/// Path data in relative steps of tenths of a pixel: short, and without accumulated rounding.
 fn path_of(frame: &Frame, x: &[f64], y: &[f64]) -> String {
     let mut path = String::new();
-    let mut drawing = false;
+    let mut last: Option<(i64, i64)> = None;
+    let tenths = |value: f64| (10.0 * value).round() as i64;
     for (x, y) in x.iter().zip(y) {
         if !(x.is_finite() && y.is_finite()) {
-            drawing = false;
+            last = None;
             continue;
         }
-        path.push(if drawing { 'L' } else { 'M' });
-        path.push_str(&pixel(frame.x.place(*x, frame.left, frame.right)));
-        path.push(' ');
-        path.push_str(&pixel(frame.y.place(*y, frame.bottom, frame.top).clamp(frame.top, frame.bottom)));
-        drawing = true;
+        let across = tenths(frame.x.place(*x, frame.left, frame.right));
+        let down = tenths(frame.y.place(*y, frame.bottom, frame.top).clamp(frame.top, frame.bottom));
+        match last {
+            None => push(&mut path, format_args!("M{} {}", tenth(across), tenth(down))),
+            Some(from) => {
+                let down_text = tenth(down - from.1);
+                let gap = if down_text.starts_with('-') { "" } else { " " };
+                push(&mut path, format_args!("l{}{gap}{down_text}", tenth(across - from.0)));
+            }
+        }
+        last = Some((across, down));
     }
     path
+}
+
+/// A number of tenths in its shortest form: `-.5`, `12`, `3.1`.
+fn tenth(tenths: i64) -> String {
+    let sign = if tenths < 0 { "-" } else { "" };
+    let (whole, rest) = (tenths.abs() / 10, tenths.abs() % 10);
+    match (whole, rest) {
+        (whole, 0) => format!("{}{whole}", if whole == 0 { "" } else { sign }),
+        (0, rest) => format!("{sign}.{rest}"),
+        (whole, rest) => format!("{sign}{whole}.{rest}"),
+    }
+}
+
+fn draw_circles(frame: &Frame, x: &[f64], y: &[f64], style: Style, svg: &mut String) {
+    for (x, y) in x.iter().zip(y).filter(|(x, y)| x.is_finite() && y.is_finite()) {
+        let across = pixel(frame.x.place(*x, frame.left, frame.right));
+        let down = pixel(frame.y.place(*y, frame.bottom, frame.top).clamp(frame.top, frame.bottom));
+        push(svg, format_args!("<circle class=\"ring {}\" cx=\"{across}\" cy=\"{down}\" r=\"2.6\"/>", style.class()));
+    }
 }
 
 /// Points gathered in cells; the number in a cell decides how dark it is (classes `few` to `many`).
@@ -336,8 +370,9 @@ mod tests {
         y[31_234] = 5.0;
         let svg = plot(vec![Mark::Line { x: x.into(), y: y.into(), style: Style::After, name: "" }]).svg();
         assert!(svg.len() < 20_000, "{} bytes", svg.len());
-        // The peak sits 5 % (of the range) below the upper end: 28 + 132 * 0.05 / 1.1.
-        assert!(svg.contains(" 34L"), "the peak is drawn");
+        // Between margins of 5 % of the range the 132 pixels of height leave 120 for the peak.
+        let path = svg.split("class=\"line after\" d=\"").nth(1).unwrap().split('"').next().unwrap();
+        assert!(path.contains("-120l"), "the peak of 120 pixels is drawn: {path}");
     }
 
     #[test]

@@ -54,7 +54,7 @@ fn row(anatomy: &ChannelAnatomy) -> AnatomyRow {
         ratio: number::short(anatomy.residual_rms / anatomy.noise_rms, 2),
         noise_source: anatomy.noise_source.clone(),
         whiteness: number::probability(anatomy.whiteness_p),
-        spectrum_svg: spectrum_bars(&anatomy.bands, 300.0),
+        spectrum_svg: spectrum_bars(&anatomy.bands, 240.0),
         correlations: strongest.into_iter().take(SHOWN).map(correlation).collect(),
     }
 }

@@ -21,17 +21,21 @@
 
   const options = (record, channel, series, place, residual) => {
     const axis = (label, extra) => Object.assign({
-      label, stroke: colour("soft"), font: "12px system-ui", labelFont: "12px system-ui", labelSize: 20, labelGap: 0,
+      label, stroke: colour("soft"), font: "12px system-ui", labelFont: "12px system-ui", labelSize: label ? 20 : 0, labelGap: 0,
       grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("line"), width: 1, size: 5 },
     }, extra);
     return {
-      width: place.clientWidth, height: residual ? 165 : 240,
-      legend: { show: !residual },
+      width: place.clientWidth, height: residual ? 160 : 230,
+      legend: {
+        show: !residual,
+        markers: { width: 0, fill: (_, index) => (index > 0 ? stroke(series[index - 1].class) : "transparent") },
+        mount: (_, legend) => place.prepend(legend),
+      },
       cursor: { sync: { key: record.key, setSeries: false }, drag: { x: true, y: false }, y: false },
       scales: { x: { time: false } },
       axes: [
-        axis(residual ? "time [s]" : null, { size: residual ? 34 : 26, labelSize: residual ? 18 : 0 }),
-        axis(residual ? `residual [${channel.unit}]` : channel.label, { size: 46, space: 30 }),
+        residual ? axis("time [s]", { size: 24 }) : axis(null, { size: 6, values: (_, ticks) => ticks.map(() => "") }),
+        axis(residual ? `residual [${channel.unit}]` : channel.label, { size: 46, space: residual ? 20 : 30 }),
       ],
       series: [{ label: "time [s]", value: (_, value) => digits(value) }].concat(series.map((one) => ({
         label: one.name, stroke: stroke(one.class), width: one.class === "measured" ? 1.4 : 1,

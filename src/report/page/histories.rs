@@ -15,7 +15,7 @@ pub struct Curve<'a> {
 }
 
 /// Values (2 bytes each) that a page carries at most; beyond that curves are thinned, peaks kept.
-const VALUE_BUDGET: usize = 1_100_000;
+const VALUE_BUDGET: usize = 600_000;
 /// Records beyond this number are folded away at first.
 const OPEN_RECORDS: usize = 4;
 const WIDTH: f64 = 1100.0;
@@ -119,8 +119,8 @@ fn bucket(curves: &[Curve]) -> usize {
     let Some(first) = curves.first() else { return 1 };
     let samples: usize = first.fit.records.iter().map(|record| record.time.len() * record.channels.len()).sum();
     let values = samples * (1 + 2 * curves.len());
-    // Two values stay per bucket.
-    if values <= VALUE_BUDGET { 1 } else { (2 * values).div_ceil(VALUE_BUDGET).max(3) }
+    // Two values stay per bucket; an even size keeps their instants uniform.
+    if values <= VALUE_BUDGET { 1 } else { 2 * values.div_ceil(VALUE_BUDGET) }
 }
 
 #[derive(Serialize)]
@@ -188,18 +188,27 @@ fn record_data(curves: &[Curve], record_index: usize, record: &RecordFit, size: 
     }
 }
 
+/// Instants of the values that [`envelope`] keeps: the first and the middle one of each bucket.
 fn time_data(time: &[f64], size: usize) -> TimeData {
-    let listed = || {
-        let instants = time.chunks(size).flat_map(|chunk| match size {
-            1 | 2 => chunk.to_vec(),
-            _ => vec![chunk[0], chunk[chunk.len() / 2]],
-        });
-        TimeData::Listed { values: instants.map(|instant| (instant * 1e6).round() * 1e-6).collect() }
-    };
     let (Some(start), Some(end)) = (time.first(), time.last()) else { return TimeData::Listed { values: vec![] } };
     let step = (end - start) / (time.len() - 1).max(1) as f64;
     let even = time.iter().enumerate().all(|(index, t)| (t - start - step * index as f64).abs() <= 1e-3 * step);
-    if even && size < 3 { TimeData::Uniform { start: *start, step, count: time.len() } } else { listed() }
+    match (even, size) {
+        (true, 0..3) => TimeData::Uniform { start: *start, step, count: time.len() },
+        (true, size) => {
+            let step = step * size as f64 / 2.0;
+            TimeData::Uniform { start: *start, step, count: 2 * time.len().div_ceil(size) }
+        }
+        (false, 0..3) => TimeData::Listed { values: time.iter().copied().map(microseconds).collect() },
+        (false, size) => {
+            let ends = time.chunks(size).flat_map(|chunk| [chunk[0], chunk[chunk.len() / 2]]);
+            TimeData::Listed { values: ends.map(microseconds).collect() }
+        }
+    }
+}
+
+fn microseconds(instant: f64) -> f64 {
+    (instant * 1e6).round() * 1e-6
 }
 
 fn encoded(name: &str, style: Style, values: &[f64]) -> SeriesData {
@@ -240,7 +249,10 @@ mod tests {
         let time: Vec<f64> = (0..1000).map(|index| 1.0 + index as f64 * 1e-3).collect();
         assert!(matches!(time_data(&time, 1), TimeData::Uniform { count: 1000, .. }));
         assert!(matches!(time_data(&[0.0, 1.0, 5.0], 1), TimeData::Listed { .. }));
-        let TimeData::Listed { values } = time_data(&time, 10) else { panic!("thinned instants are listed") };
-        assert_eq!(values.len(), 200);
+        let TimeData::Uniform { step, count, .. } = time_data(&time, 10) else {
+            panic!("thinned instants are uniform")
+        };
+        assert_eq!(count, envelope(&time, 10).len());
+        assert!((step - 5e-3).abs() < 1e-12);
     }
 }

@@ -68,20 +68,20 @@ fn scatter<'a>(missing: &'a MissingForce, x: &'a [f64], x_label: String, width: 
         x: x.into(),
         y: missing.force.as_slice().into(),
         style: Style::Missing,
-        name: "estimated from the residual",
+        name: "from the residual",
     }];
     if missing.explained.len() == x.len() {
         marks.push(Mark::Cloud {
             x: x.into(),
             y: missing.explained.as_slice().into(),
             style: Style::After,
-            name: "accepted extension",
+            name: "extension",
         });
     }
     let medians = median_by_bin(x, &missing.force, BINS, LEAST_POINTS);
     if medians.len() > 1 {
         let (centres, values): (Vec<f64>, Vec<f64>) = medians.into_iter().unzip();
-        marks.push(Mark::Line { x: centres.into(), y: values.into(), style: Style::Median, name: "median" });
+        marks.push(Mark::Circles { x: centres.into(), y: values.into(), style: Style::Median, name: "median" });
     }
     let quantity = if missing.unit.contains("*m") { "missing torque" } else { "missing force" };
     let y_label = format!("{quantity} [{}]", missing.unit);

@@ -12,6 +12,7 @@ mod ranking;
 mod template;
 mod view;
 
+pub(crate) use missing::{ordered as places, over_rate as missing_over_rate};
 pub use template::RenderError;
 
 use crate::diagnose::Answer;

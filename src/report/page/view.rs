@@ -155,16 +155,20 @@ pub fn comparison(variants: &[Identification]) -> ComparisonPage {
 
 fn fits(curves: &[Curve]) -> FitsView {
     FitsView {
-        legend: curves
-            .iter()
-            .map(|curve| LegendEntry { name: curve.name.clone(), class: curve.style.class() })
-            .collect(),
+        legend: curves.iter().map(legend_entry).collect(),
         histories: histories::views(curves),
         tree: discrepancy::rows(curves),
         parameters: parameters::rows(curves),
         parameter_notes: parameters::notes(curves),
         works: curves.iter().map(|curve| work(curve.fit)).collect(),
     }
+}
+
+/// The variant's name, with its place in time where the curve says one.
+fn legend_entry(curve: &Curve) -> LegendEntry {
+    let when = ["before", "after"].into_iter().find(|word| curve.name.ends_with(word));
+    let name = when.map_or(curve.fit.variant.clone(), |when| format!("{when}: {}", curve.fit.variant));
+    LegendEntry { name, class: curve.style.class() }
 }
 
 fn answer_figures(answer: &Answer) -> Vec<KeyFigure> {
