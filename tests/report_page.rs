@@ -158,6 +158,7 @@ fn gaps_and_non_finite_results_are_shown_as_such() {
     answer.extended.validation_discrepancy = Some(f64::INFINITY);
     answer.extended.bic = f64::NAN;
     answer.missing_forces[0].force.fill(f64::NAN);
+    answer.missing_forces[0].explained.clear();
     let page = page::answer(&answer).unwrap();
     assert_sound(&page);
     assert!(page.contains("no finite values to show") && page.contains("infinite"));
