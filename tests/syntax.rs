@@ -14,6 +14,17 @@ fn study_files(folder: &str) -> Vec<PathBuf> {
     paths
 }
 
+/// The prelude and the folders of the shipped studies.
+fn shipped_folders() -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let studies = fs::read_dir(root.join("studies")).expect("shipped studies");
+    let folders = studies.map(|entry| entry.expect("readable folder").path()).filter(|path| path.is_dir());
+    let mut names: Vec<String> = folders.map(|path| path.display().to_string()).collect();
+    names.extend(root.join("grammar/prelude").is_dir().then(|| "grammar/prelude".to_owned()));
+    names.sort();
+    names
+}
+
 /// The tree as text without its spans.
 fn shape(tree: &Tree) -> String {
     let debug = format!("{tree:?}");
@@ -32,10 +43,13 @@ fn read_without_errors(name: &str, text: &str) -> Tree {
 
 #[test]
 fn printing_and_reading_again_gives_the_same_tree() {
-    for path in study_files("tests/cases/syntax_good") {
+    let folders = ["tests/cases/syntax_good".to_owned()].into_iter().chain(shipped_folders());
+    let paths: Vec<PathBuf> = folders.flat_map(|folder| study_files(&folder)).collect();
+    assert!(paths.len() > 5, "the shipped studies are missing");
+    for path in paths {
         let text = fs::read_to_string(&path).expect("readable case");
         let tree = read_without_errors(&path.display().to_string(), &text);
-        assert!(tree.items.len() > 5, "{}", path.display());
+        assert!(!tree.items.is_empty(), "{}", path.display());
         let printed = print(&tree);
         let again = read_without_errors("printed", &printed);
         assert_eq!(shape(&tree), shape(&again), "{printed}");
@@ -62,6 +76,24 @@ fn errors_are_told_in_an_engineers_words() {
         settings.set_prepend_module_to_snapshot(false);
         settings.set_omit_expression(true);
         settings.bind(|| insta::assert_snapshot!(name.trim_end_matches(".ident"), shown));
+    }
+}
+
+/// Every example of the language reference is read without errors.
+#[test]
+fn examples_of_the_reference_are_read() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("grammar/README.md");
+    let text = fs::read_to_string(path).expect("language reference");
+    let mut examples = text.split("```ident\n").skip(1);
+    let mut count = 0;
+    for example in examples.by_ref() {
+        let (code, _) = example.split_once("```").expect("closed fence");
+        assert!(!read_without_errors("grammar/README.md", code).items.is_empty(), "{code}");
+        count += 1;
+    }
+    assert!(count >= 12, "only {count} examples");
+    for entry in ident::quantities::NAMED_TYPES {
+        assert!(text.contains(entry.name), "the reference does not name the type {}", entry.name);
     }
 }
 

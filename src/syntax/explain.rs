@@ -302,7 +302,10 @@ fn expectation(rules: &[Rule]) -> String {
     // stand. Names and parentheses are expressions.
     let has = |rank: u8| rules.iter().filter_map(|rule| description(*rule)).any(|(other, _)| other == rank);
     let (value, entry) = (has(VALUE_RANK), has(ENTRY_RANK));
-    words.retain(|(rank, word)| !(value && matches!(rank, 2 | 3)) && !(entry && word == "`,`" || word == "`point`"));
+    words.retain(|(rank, word)| {
+        let covered = (value && matches!(rank, 2 | 3)) || (entry && word == "`,`") || word == "`point`";
+        !covered
+    });
     if words.iter().any(|(rank, _)| *rank < OPERATOR_RANK) {
         words.retain(|(rank, _)| *rank < OPERATOR_RANK);
     }
