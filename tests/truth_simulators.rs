@@ -29,6 +29,9 @@ impl Mechanism for Refined<'_> {
     fn channels(&self) -> &[Channel] {
         self.mechanism.channels()
     }
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        self.mechanism.parameters()
+    }
     fn schedule(&self) -> Schedule {
         let schedule = self.mechanism.schedule();
         Schedule { substeps: (schedule.substeps as f64 * self.factor) as usize, ..schedule }
@@ -67,6 +70,9 @@ impl Mechanism for BlockOnBelt {
     }
     fn channels(&self) -> &[Channel] {
         &BELT_CHANNELS
+    }
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        vec![]
     }
     fn schedule(&self) -> Schedule {
         Schedule {
@@ -205,6 +211,9 @@ impl Mechanism for EnergyOf<'_> {
     }
     fn channels(&self) -> &[Channel] {
         &ENERGY
+    }
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        self.mechanism.parameters()
     }
     fn schedule(&self) -> Schedule {
         self.mechanism.schedule()

@@ -70,6 +70,14 @@ impl Mechanism for CranePendulum {
         }
     }
 
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("m_load", self.load_mass),
+            ("c_centring", self.centring_stiffness),
+            ("d_rolling", self.rolling_resistance),
+        ]
+    }
+
     fn law(&self, place: usize, x: f64, v: f64, u: f64) -> f64 {
         match place {
             DRIVE => u,

@@ -56,6 +56,8 @@ pub trait Mechanism: Sync + Send {
     fn input(&self) -> Channel;
     fn channels(&self) -> &[Channel];
     fn schedule(&self) -> Schedule;
+    /// The numbers that the study identifies, by its names, in SI.
+    fn parameters(&self) -> Vec<(&'static str, f64)>;
     /// Load of the undisturbed law at `place` (zero where no law stands) at input value `u`.
     fn law(&self, place: usize, x: f64, v: f64, u: f64) -> f64;
     /// Accelerations under the generalised forces `force`.

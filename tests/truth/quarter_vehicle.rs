@@ -102,6 +102,17 @@ impl Mechanism for QuarterVehicle {
         }
     }
 
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("c_tyre", self.tyre_stiffness),
+            ("c_strut", self.strut_stiffness),
+            ("d_compression", self.compression.slope),
+            ("d_rebound", self.rebound.slope),
+            ("f_act", self.actuator_frequency),
+            ("d_act", self.actuator_damping),
+        ]
+    }
+
     fn law(&self, place: usize, x: f64, v: f64, u: f64) -> f64 {
         match place {
             SHAKER => self.shaker(x, v, u),

@@ -56,6 +56,10 @@ impl Mechanism for SpringSlide {
         }
     }
 
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        vec![("m_slider", self.mass), ("c_return", self.stiffness), ("d_slide", self.damping)]
+    }
+
     fn law(&self, place: usize, x: f64, v: f64, u: f64) -> f64 {
         match place {
             PUSH => u,

@@ -68,6 +68,15 @@ impl Mechanism for TwoMass {
         }
     }
 
+    fn parameters(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("J_load", self.load_inertia),
+            ("c_coupling", self.stiffness),
+            ("d_coupling", self.coupling_damping),
+            ("d_bearing", self.bearing_damping),
+        ]
+    }
+
     fn law(&self, place: usize, x: f64, v: f64, u: f64) -> f64 {
         match place {
             MOTOR_TORQUE => u,
