@@ -272,7 +272,8 @@ impl<'a> Checker<'a> {
                 return self.fail(diagnostic, SCOPE);
             }
         };
-        if self.effect_of(index).is_some() {
+        // What an effect adds to a joint is the site's own load and acts once; only other sites have a chain.
+        if self.effect_of(index).is_some() && !matches!(site, Site::JointEffect(_)) {
             self.site_effects.entry(site).or_default().push(index);
         }
         Some((site, entity))
