@@ -282,7 +282,19 @@ codes! {
 
     // ---- E05xx: simulation ----
 
+    NO_ESTIMATION_RECORD "E0501" "no record to fit"
+    "Parameters are fitted to experiments of the role `estimation`; the study has none. Give an experiment that role, or\n\
+     declare one.\n"
+
+    SIMULATION_FAILED "E0502" "simulation failed"
+    "The integration could not go on. The message names the time, the cause and the state to blame; typical causes are a\n\
+     start value far from reality, a law that jumps, a wrong sign, or a motion without equilibrium.\n"
+
     // ---- E06xx: fit and diagnosis ----
+
+    FIT_FAILED "E0601" "fit cannot begin"
+    "The model cannot be simulated at the start values of the parameters, or the bounds contradict each other. The message\n\
+     names the first simulation that failed.\n"
 
     // ---- E07xx: command line ----
 

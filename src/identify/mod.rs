@@ -4,6 +4,16 @@
 //! *In*: a compiled study with its records. *Out*: an [`Identification`]. *Must not happen here*: text of any kind,
 //! decisions about the model's structure.
 
+mod confidence;
+mod fitting;
+mod problem;
+mod report;
 mod result;
+mod weights;
 
+pub use confidence::{Confidence, confidence};
+pub use fitting::{Fitted, Settings, fit, prefilters};
+pub use problem::{Block, Problem};
+pub use report::identification;
 pub use result::*;
+pub use weights::Weighting;

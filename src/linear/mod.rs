@@ -1,11 +1,15 @@
 //! Dense and sparse linear algebra behind concrete types: the only module that names faer and nalgebra.
 
+mod basis;
 mod dense_lu;
 mod factorisation;
 mod pattern;
+mod regularised;
 mod sparse_lu;
 mod svd;
 
+pub use basis::{Basis, least_squares};
 pub use factorisation::{Factorisation, SingularMatrix};
 pub use pattern::SparsityPattern;
+pub use regularised::smooth_least_squares;
 pub use svd::{DecompositionError, SingularValueDecomposition, rounding_threshold};

@@ -2,6 +2,7 @@
 
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::Dimension;
+use std::collections::HashMap;
 
 /// `x' = rates(t, x, w, theta)`, `0 = constraints(t, x, w, theta)`, `y = outputs(t, x, w, theta)`.
 ///
@@ -58,4 +59,34 @@ pub enum StartEquation {
     Value(Node),
     /// From the condition of equilibrium: velocities zero, all rates zero.
     Equilibrium,
+}
+
+impl System {
+    /// Replaces parameters by numbers (SI): they become constants of the equations and are parameters no longer.
+    pub fn freeze(&mut self, values: &[(Symbol, f64)]) {
+        let replacements: HashMap<Symbol, Node> =
+            values.iter().map(|&(symbol, value)| (symbol, self.graph.constant(value))).collect();
+        let mut substitute = |nodes: Vec<&mut Node>| {
+            let old: Vec<Node> = nodes.iter().map(|node| **node).collect();
+            let new = self.graph.substitute(&old, &replacements);
+            nodes.into_iter().zip(new).for_each(|(node, new)| *node = new);
+        };
+        substitute(self.rates.iter_mut().chain(&mut self.constraints).collect());
+        substitute(self.outputs.iter_mut().chain(&mut self.probes).map(|output| &mut output.value).collect());
+        substitute(
+            self.starts
+                .iter_mut()
+                .flatten()
+                .filter_map(|equation| match equation {
+                    StartEquation::Value(node) => Some(node),
+                    StartEquation::Equilibrium => None,
+                })
+                .collect(),
+        );
+        let kept: Vec<bool> = self.parameters.iter().map(|symbol| !replacements.contains_key(symbol)).collect();
+        let mut keep = kept.iter();
+        self.parameters.retain(|_| *keep.next().unwrap_or(&true));
+        let mut keep = kept.iter();
+        self.parameter_names.retain(|_| *keep.next().unwrap_or(&true));
+    }
 }

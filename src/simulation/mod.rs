@@ -1,1 +1,13 @@
-//! (contract follows)
+//! Runs an experiment: start values, integration, measured channels and their gradient.
+//!
+//! *In*: a compiled model, a prepared [`Record`], parameter values. *Out*: a [`Trajectory`] at the record's compared
+//! samples, or a [`Failure`] in the study's words. *Must not happen here*: comparison with the measurement, decisions
+//! about parameters.
+
+mod failure;
+mod prepare;
+mod run;
+
+pub use failure::Failure;
+pub use prepare::{Record, RecordInputs, prepare};
+pub use run::{Compiled, Gradient, Trajectory, probe, simulate};

@@ -1,0 +1,41 @@
+//! Files that appear whole or not at all.
+
+use super::Failed;
+use std::io::Write;
+use std::path::Path;
+
+/// Writes `content` to a temporary file beside `path` and renames it.
+pub(super) fn write_whole(path: &Path, content: &str) -> Result<(), Failed> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let written = tempfile::Builder::new().prefix(".ident").tempfile_in(folder).and_then(|mut file| {
+        file.write_all(content.as_bytes())?;
+        file.flush()?;
+        readable(&file)?;
+        file.persist(path).map_err(|error| error.error)?;
+        Ok(())
+    });
+    written.map_err(|error| {
+        eprintln!("error: cannot write {}: {error}", path.display());
+        Failed
+    })
+}
+
+/// Temporary files are private to the user; results are not.
+#[cfg(unix)]
+fn readable(file: &tempfile::NamedTempFile) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn readable(_file: &tempfile::NamedTempFile) -> std::io::Result<()> {
+    Ok(())
+}
+
+/// The text of a JSON document, or a message where it cannot be made.
+pub(super) fn json(document: Result<String, serde_json::Error>) -> Result<String, Failed> {
+    document.map_err(|error| {
+        eprintln!("error: the answer cannot be written as JSON: {error}");
+        Failed
+    })
+}

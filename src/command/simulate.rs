@@ -1,0 +1,82 @@
+//! `ident simulate STUDY`
+
+use super::output::write_whole;
+use super::session::Session;
+use super::{Failed, StudyArguments};
+use crate::simulation::{Compiled, Gradient, Record, simulate};
+use std::path::PathBuf;
+
+#[derive(clap::Args, Debug)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    study: StudyArguments,
+    /// Parameter values instead of the study's start values, e.g. `--set "mu=0.1"` (in the study's unit)
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    values: Vec<String>,
+    /// Folder for one CSV file per experiment (default: standard output)
+    #[arg(long, value_name = "DIR")]
+    output: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
+    let study = &arguments.study;
+    super::set_threads(study.threads)?;
+    let session = Session::open(&study.study, study.format)?;
+    let compiled = session.compile(&study.variant)?;
+    let theta = parameters(&compiled, &arguments.values)?;
+    let records = session.records(&compiled.study, study)?;
+    let mut tables = Vec::new();
+    for record in &records {
+        let table = table(&compiled, record, &theta).map_err(|explanation| {
+            eprintln!("error: {explanation}");
+            Failed
+        })?;
+        tables.push((record, table));
+    }
+    for (record, table) in tables {
+        match &arguments.output {
+            Some(folder) => write_whole(&folder.join(format!("{}.csv", record.name)), &table)?,
+            None => print!("{table}"),
+        }
+    }
+    Ok(())
+}
+
+/// Start values with the given ones put in.
+fn parameters(compiled: &Compiled, given: &[String]) -> Result<Vec<f64>, Failed> {
+    let mut theta: Vec<f64> = compiled.study.parameters.iter().map(|parameter| parameter.start).collect();
+    for text in given {
+        let parsed = text.split_once('=').and_then(|(name, value)| {
+            let index = compiled.study.parameters.iter().position(|p| p.name == name.trim())?;
+            Some((index, value.trim().parse::<f64>().ok().filter(|value| value.is_finite())?))
+        });
+        let Some((index, value)) = parsed else {
+            let known: Vec<&str> = compiled.study.parameters.iter().map(|p| p.name.as_str()).collect();
+            eprintln!("error: `--set {text}` must be NAME=VALUE with a parameter of the study ({})", known.join(", "));
+            return Err(Failed);
+        };
+        theta[index] = compiled.study.parameters[index].unit.to_si(value);
+    }
+    Ok(theta)
+}
+
+/// Time and simulated channels in the study's units as CSV.
+fn table(compiled: &Compiled, record: &Record, theta: &[f64]) -> Result<String, String> {
+    let trajectory = simulate(compiled, record, theta, Gradient::None).map_err(|failure| {
+        format!("{failure}\nhelp: {}", failure.help)
+    })?;
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let measures = record.measures.iter().map(|&measure| &compiled.study.measures[measure]);
+    let mut head = vec!["t [s]".to_owned()];
+    head.extend(measures.clone().map(|measure| format!("{} [{}]", measure.name, measure.unit.symbol)));
+    writer.write_record(&head).map_err(|error| error.to_string())?;
+    for (k, time) in record.compared_times().iter().enumerate() {
+        let mut row = vec![time.to_string()];
+        row.extend(
+            measures.clone().zip(&trajectory.channels).map(|(m, channel)| m.unit.from_si(channel[k]).to_string()),
+        );
+        writer.write_record(&row).map_err(|error| error.to_string())?;
+    }
+    let bytes = writer.into_inner().map_err(|error| error.to_string())?;
+    String::from_utf8(bytes).map_err(|error| error.to_string())
+}

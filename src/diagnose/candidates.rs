@@ -1,0 +1,315 @@
+//! The candidates of one round: every effect of the catalogue at every place it fits, and every number the study holds
+//! fixed. A candidate is nothing but the text of a variant with start values to try.
+
+use super::typical::Typical;
+use crate::quantities::{Dimension, Unit};
+use crate::study::{EffectDeclaration, EffectParameter, Place, PlaceKind, PlaceQuantity, Study};
+use std::fmt::Write;
+
+/// Amplitudes of effects that declare no range may grow to this multiple of their natural scale.
+const AMPLITUDE_REACH: f64 = 20.0;
+/// Significant digits of numbers in generated text.
+const DIGITS: usize = 6;
+/// A number held fixed may be off by this factor either way.
+const CONSTANT_REACH: f64 = 4.0;
+/// Finite strengths tried for effects without a derivative at their neutral value, log-spaced over the range.
+const FINITE_STRENGTHS: usize = 5;
+/// Values tried for a shape parameter, log-spaced over its range.
+const SHAPE_VALUES: usize = 3;
+
+/// Something that may be missing in the model.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    /// `dry_friction at slide` or `slide.mass set free`.
+    pub name: String,
+    pub effect: String,
+    pub place: String,
+    pub title: String,
+    /// Parameters the candidate adds, in the order of its `identify` lines.
+    pub unknowns: Vec<Unknown>,
+    /// How the change reads in a variant, without the `identify` block; empty for a freed constant.
+    pub change: String,
+}
+
+/// A parameter that a candidate adds, SI.
+#[derive(Clone, Debug)]
+pub(super) struct Unknown {
+    /// Parameter name or path of the freed constant.
+    pub target: String,
+    pub dimension: Dimension,
+    pub lower: f64,
+    pub upper: f64,
+    pub neutral: f64,
+    pub role: UnknownRole,
+    /// Typical size, used where no better start is known.
+    pub scale: f64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum UnknownRole {
+    /// Strength with a score at its neutral value.
+    Amplitude,
+    /// Strength that must be scanned at these finite values.
+    FiniteAmplitude(Vec<f64>),
+    /// Shape, to be scanned at these values.
+    Shape(Vec<f64>),
+    /// Frequency, Hz: scanned at the peaks of the residual's spectrum.
+    Frequency,
+}
+
+impl Candidate {
+    /// The candidate as a variant of `base` with the unknowns starting at `values` (SI).
+    pub(super) fn variant(&self, name: &str, base: &str, values: &[f64]) -> String {
+        let mut text = format!("variant {name} of {base} {{\n");
+        if !self.change.is_empty() {
+            let _ = writeln!(text, "  add {}", self.change);
+        }
+        let _ = writeln!(text, "  identify {{");
+        for (unknown, &value) in self.unknowns.iter().zip(values) {
+            let unit = Unit::coherent(unknown.dimension);
+            let quantity = |value: f64| unit.format(value, DIGITS);
+            let _ = writeln!(
+                text,
+                "    {} in {} .. {} from {}",
+                unknown.target,
+                quantity(unknown.lower),
+                quantity(unknown.upper),
+                quantity(value.clamp(unknown.lower, unknown.upper)),
+            );
+        }
+        text.push_str("  }\n}\n");
+        text
+    }
+
+    /// Strengths of an effect with their neutral values; none for a freed constant.
+    pub(super) fn strengths(&self) -> Vec<(String, f64)> {
+        if self.change.is_empty() {
+            return Vec::new();
+        }
+        self.unknowns
+            .iter()
+            .filter(|unknown| matches!(unknown.role, UnknownRole::Amplitude | UnknownRole::FiniteAmplitude(_)))
+            .map(|unknown| (unknown.target.clone(), unknown.neutral))
+            .collect()
+    }
+
+    /// Values of all unknowns at which the candidate changes nothing, with shapes in the middle of their grids.
+    pub(super) fn neutral(&self) -> Vec<f64> {
+        self.unknowns
+            .iter()
+            .map(|unknown| match &unknown.role {
+                UnknownRole::Shape(values) => values[values.len() / 2],
+                UnknownRole::Frequency => (unknown.lower * unknown.upper).sqrt(),
+                _ => unknown.neutral,
+            })
+            .collect()
+    }
+}
+
+/// All candidates for `study`, in order of catalogue and place. `typical` holds one entry per place.
+pub(super) fn candidates(study: &Study, typical: &[Typical]) -> Vec<Candidate> {
+    let mut list = Vec::new();
+    for effect in &study.effects {
+        for (place, typical) in study.places.iter().zip(typical) {
+            if fits(effect, place) {
+                list.extend(effect_candidate(study, effect, place, typical));
+            }
+        }
+    }
+    list.extend(study.constants.iter().filter_map(|constant| freed_constant(study, constant)));
+    list
+}
+
+fn fits(effect: &EffectDeclaration, place: &Place) -> bool {
+    effect.kinds.contains(&place.kind)
+        && effect.motion.is_none_or(|motion| place.motion == Some(motion))
+        && effect.dimension.is_none_or(|dimension| dimension == place.dimension)
+}
+
+fn effect_candidate(
+    study: &Study,
+    effect: &EffectDeclaration,
+    place: &Place,
+    typical: &Typical,
+) -> Option<Candidate> {
+    let element = unused_name(study, &format!("{}_{}", place.name.replace('.', "_"), effect.name));
+    let mut unknowns = Vec::new();
+    for parameter in &effect.amplitudes {
+        unknowns.push(amplitude(&element, parameter, place, typical)?);
+    }
+    for parameter in &effect.shapes {
+        unknowns.push(shape(&element, parameter, place, typical)?);
+    }
+    let fields: Vec<String> = effect
+        .amplitudes
+        .iter()
+        .chain(&effect.shapes)
+        .zip(&unknowns)
+        .map(|(parameter, unknown)| format!("{} = {}", parameter.name, unknown.target))
+        .collect();
+    Some(Candidate {
+        name: format!("{} at {}", effect.name, place.name),
+        effect: effect.name.clone(),
+        place: place.name.clone(),
+        title: effect.title.clone(),
+        unknowns,
+        change: format!("effect {element}: {} on {} {{ {} }}", effect.name, place.name, fields.join(", ")),
+    })
+}
+
+/// `wanted`, or with a number behind it where the study uses the name already (a second dose of the same effect).
+fn unused_name(study: &Study, wanted: &str) -> String {
+    let used = |name: &str| {
+        study.places.iter().any(|place| place.name == name)
+            || study.parameters.iter().any(|parameter| parameter.name.starts_with(&format!("{name}_")))
+    };
+    if !used(wanted) {
+        return wanted.to_owned();
+    }
+    (2..).map(|count| format!("{wanted}_{count}")).find(|name| !used(name)).unwrap_or_else(|| wanted.to_owned())
+}
+
+/// Natural scale of a parameter at a place: its monomial evaluated with typical magnitudes. `None` where the place never
+/// moves or carries nothing, so the effect could not show.
+fn natural_scale(parameter: &EffectParameter, typical: &Typical) -> Option<f64> {
+    let mut scale = 1.0;
+    for &(quantity, exponent) in &parameter.monomial {
+        let magnitude = typical.of(quantity)?;
+        scale *= magnitude.powi(i32::from(exponent));
+    }
+    (scale.is_finite() && scale > 0.0).then_some(scale)
+}
+
+fn dimension_at(parameter: &EffectParameter, place: &Place) -> Dimension {
+    parameter.dimension.unwrap_or_else(|| {
+        parameter.monomial.iter().fold(Dimension::default(), |product, &(quantity, exponent)| {
+            let factor = place.quantity_dimension(quantity).power(i32::from(exponent)).unwrap_or_default();
+            product.multiply(factor)
+        })
+    })
+}
+
+fn amplitude(element: &str, parameter: &EffectParameter, place: &Place, typical: &Typical) -> Option<Unknown> {
+    let scale = if parameter.monomial.is_empty() { None } else { Some(natural_scale(parameter, typical)?) };
+    let relative = parameter.relative_range.zip(scale).map(|((low, high), scale)| (low * scale, high * scale));
+    let reach = scale.unwrap_or(1.0) * AMPLITUDE_REACH;
+    let (mut lower, upper) = parameter.range.or(relative).unwrap_or((parameter.neutral - reach, parameter.neutral + reach));
+    if parameter.one_sided {
+        lower = lower.max(parameter.neutral);
+    }
+    let role = if parameter.finite_only {
+        let positive = log_spaced(lower.max(upper * 1e-3), upper, FINITE_STRENGTHS);
+        UnknownRole::FiniteAmplitude(positive)
+    } else {
+        UnknownRole::Amplitude
+    };
+    Some(Unknown {
+        target: format!("{element}_{}", parameter.name),
+        dimension: dimension_at(parameter, place),
+        lower,
+        upper,
+        neutral: parameter.neutral,
+        role,
+        scale: scale.unwrap_or((upper - lower) / 10.0),
+    })
+}
+
+fn shape(element: &str, parameter: &EffectParameter, place: &Place, typical: &Typical) -> Option<Unknown> {
+    let dimension = dimension_at(parameter, place);
+    let scale = if parameter.monomial.is_empty() { None } else { Some(natural_scale(parameter, typical)?) };
+    let relative = match parameter.relative_range {
+        Some((low, high)) => {
+            let scale = scale?;
+            Some((low * scale, high * scale))
+        }
+        None => None,
+    };
+    let (lower, upper) = parameter.range.or(relative).or(scale.map(|scale| (0.1 * scale, 2.0 * scale)))?;
+    let is_frequency = parameter.monomial.is_empty() && dimension == (Dimension { time: -1, ..Dimension::default() });
+    let role = if is_frequency {
+        UnknownRole::Frequency
+    } else if lower > 0.0 {
+        UnknownRole::Shape(log_spaced(lower, upper, SHAPE_VALUES))
+    } else {
+        UnknownRole::Shape(evenly_spaced(lower, upper, SHAPE_VALUES))
+    };
+    let scale = scale.unwrap_or(upper - lower);
+    Some(Unknown {
+        target: format!("{element}_{}", parameter.name),
+        dimension,
+        lower,
+        upper,
+        neutral: parameter.neutral,
+        role,
+        scale,
+    })
+}
+
+fn freed_constant(study: &Study, constant: &crate::study::Constant) -> Option<Candidate> {
+    if constant.value == 0.0 || study.parameters.iter().any(|parameter| parameter.name == constant.path) {
+        return None;
+    }
+    let ends = [constant.value / CONSTANT_REACH, constant.value * CONSTANT_REACH];
+    Some(Candidate {
+        name: format!("{} set free", constant.path),
+        effect: "constant".to_owned(),
+        place: constant.path.clone(),
+        title: format!("The value {} of {} is not right", constant.unit.format(constant.value, DIGITS), constant.path),
+        unknowns: vec![Unknown {
+            target: constant.path.clone(),
+            dimension: constant.unit.dimension,
+            lower: ends[0].min(ends[1]),
+            upper: ends[0].max(ends[1]),
+            neutral: constant.value,
+            role: UnknownRole::Amplitude,
+            scale: constant.value.abs(),
+        }],
+        change: String::new(),
+    })
+}
+
+/// Interior points of a logarithmic division of `lower .. upper` (both positive).
+fn log_spaced(lower: f64, upper: f64, count: usize) -> Vec<f64> {
+    let ratio = (upper / lower).ln();
+    (0..count).map(|i| lower * (ratio * (i as f64 + 0.5) / count as f64).exp()).collect()
+}
+
+/// Interior points of an even division.
+fn evenly_spaced(lower: f64, upper: f64, count: usize) -> Vec<f64> {
+    (0..count).map(|i| lower + (upper - lower) * (i as f64 + 0.5) / count as f64).collect()
+}
+
+impl Place {
+    /// Dimension of a quantity of this place.
+    pub(super) fn quantity_dimension(&self, quantity: PlaceQuantity) -> Dimension {
+        use crate::study::Motion;
+        let rotational = self.motion == Some(Motion::Rotational);
+        let coordinate =
+            if rotational { Dimension::default() } else { Dimension { length: 1, ..Dimension::default() } };
+        let second = Dimension { time: 1, ..Dimension::default() };
+        match quantity {
+            PlaceQuantity::Coordinate => coordinate,
+            PlaceQuantity::Rate => coordinate.divide(second),
+            PlaceQuantity::Time => second,
+            PlaceQuantity::Load | PlaceQuantity::Value => match self.kind {
+                PlaceKind::Joint | PlaceKind::Force | PlaceKind::Actuator => {
+                    let force = Dimension { mass: 1, length: 1, time: -2, ..Dimension::default() };
+                    if rotational { force.multiply(Dimension { length: 1, ..Dimension::default() }) } else { force }
+                }
+                _ => self.dimension,
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::log_spaced;
+
+    #[test]
+    fn log_spacing_lies_inside() {
+        let values = log_spaced(1.0, 1000.0, 3);
+        assert!((values[1] - 1000_f64.sqrt()).abs() < 1e-9);
+        assert!(values[0] > 1.0 && values[2] < 1000.0);
+    }
+}

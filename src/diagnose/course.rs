@@ -1,0 +1,223 @@
+//! From the rounds that were run to the answer.
+
+use super::candidates::Candidate;
+use crate::quantities::Unit;
+use super::judge::{self, Judged};
+use super::records::Roles;
+use super::round::Round;
+use super::screen::Screened;
+use super::{Answer, Candidate as Reported, ChannelAnatomy, MissingForce, Step, Verdict};
+use crate::identify::Identification;
+use crate::simulation::Compiled;
+
+/// Candidates shown in the ranking of a step.
+const SHOWN: usize = 20;
+/// An effect whose sensitivity keeps less than this share beside the fitted parameters cannot be judged.
+const MINIMUM_VISIBILITY: f64 = 0.02;
+
+/// What was done so far.
+#[derive(Default)]
+pub(super) struct Course {
+    pub steps: Vec<Step>,
+    pub texts: Vec<String>,
+    pub simulations: usize,
+    pub below_visibility: bool,
+    /// Whether any accepted candidate belongs to the catalogue's shapes without a name.
+    pub unnamed: bool,
+    cannot_judge: Vec<String>,
+}
+
+impl Course {
+    pub(super) fn accepted(&self) -> usize {
+        self.texts.len()
+    }
+
+    /// Notes a round. `chosen` indexes `judged`.
+    pub(super) fn record(
+        &mut self,
+        round: &Round,
+        candidates: &[Candidate],
+        screened: &[Option<Screened>],
+        judged: &[Judged],
+        chosen: Option<usize>,
+    ) {
+        let order = ranking_order(candidates.len(), screened, judged);
+        let mut reported: Vec<Reported> =
+            order.iter().map(|&index| entry(round, &candidates[index], screened[index].as_ref())).collect();
+        judge::report(judged, &mut reported, |index| order.iter().position(|&other| other == index));
+        let reference = chosen.or(if judged.is_empty() { None } else { Some(0) });
+        let indistinguishable =
+            reference.map(|position| judge::indistinguishable(judged, position, candidates)).unwrap_or_default();
+        if self.steps.is_empty() {
+            self.cannot_judge = invisible(candidates, screened);
+        }
+        let accepted = chosen
+            .and_then(|position| order.iter().position(|&index| index == judged[position].refitted.candidate));
+        let judgement = judgement(judged, chosen, candidates, self.below_visibility);
+        reported.truncate(SHOWN);
+        self.steps.push(Step {
+            screened: screened.iter().flatten().count(),
+            ranking: reported,
+            accepted,
+            indistinguishable,
+            judgement,
+        });
+    }
+
+    pub(super) fn answer(
+        self,
+        compiled: &Compiled,
+        base: Identification,
+        extended: Identification,
+        anatomy: Vec<ChannelAnatomy>,
+        missing_forces: Vec<MissingForce>,
+        roles: &Roles,
+    ) -> Answer {
+        let verdict = self.verdict();
+        let summary = self.summary(&verdict, &base, &extended);
+        let simulations = self.simulations + base.simulations + extended.simulations;
+        let mut remarks = base.remarks.clone();
+        remarks.extend(extended.remarks.iter().filter(|remark| !base.remarks.contains(remark)).cloned());
+        Answer {
+            study: compiled.study.name.clone(),
+            title: compiled.study.title.clone(),
+            verdict,
+            summary,
+            roles: roles.description.clone(),
+            base,
+            extended,
+            anatomy,
+            missing_forces,
+            extension: (!self.texts.is_empty()).then(|| self.texts.join("\n")),
+            steps: self.steps,
+            cannot_judge: self.cannot_judge,
+            remarks,
+            simulations,
+        }
+    }
+
+    fn verdict(&self) -> Verdict {
+        if self.below_visibility {
+            return Verdict::CannotBeJudged;
+        }
+        if self.texts.is_empty() {
+            return Verdict::NothingWrongFound;
+        }
+        if self.unnamed {
+            return Verdict::ShapeWithoutName;
+        }
+        let ambiguous = self.steps.iter().any(|step| step.accepted.is_some() && step.indistinguishable.len() > 1);
+        if ambiguous { Verdict::GroupOfCauses } else { Verdict::CauseNamed }
+    }
+
+    fn summary(&self, verdict: &Verdict, base: &Identification, extended: &Identification) -> String {
+        let level = |fit: &Identification| match fit.validation_discrepancy {
+            Some(held_out) => format!("{:.3} % estimation, {held_out:.3} % held out", fit.estimation_discrepancy),
+            None => format!("{:.3} % estimation", fit.estimation_discrepancy),
+        };
+        let named: Vec<&str> = self
+            .steps
+            .iter()
+            .filter_map(|step| step.accepted.map(|position| step.ranking[position].name.as_str()))
+            .collect();
+        match verdict {
+            Verdict::NothingWrongFound => format!(
+                "Nothing wrong found: no candidate improves the held-out record beyond chance (discrepancy {}).",
+                level(base)
+            ),
+            Verdict::CannotBeJudged => format!(
+                "Cannot be judged with these channels: even the best candidate changes them by less than 0.1 % of their \
+                 deviation (discrepancy {}). Measure a quantity that depends on the cause, such as a force, or state the \
+                 sensor's noise.",
+                level(base)
+            ),
+            Verdict::CauseNamed | Verdict::ShapeWithoutName => {
+                format!("Missing: {}. Discrepancy {} -> {}.", named.join(", then "), level(base), level(extended))
+            }
+            Verdict::GroupOfCauses => {
+                let groups: Vec<String> = self
+                    .steps
+                    .iter()
+                    .filter(|step| step.accepted.is_some())
+                    .map(|step| step.indistinguishable.join(" or "))
+                    .collect();
+                format!(
+                    "Missing: {} (this data cannot tell the members of a group apart). Discrepancy {} -> {}.",
+                    groups.join(", then "),
+                    level(base),
+                    level(extended)
+                )
+            }
+        }
+    }
+}
+
+/// Refitted candidates in the order of their criterion, then the others in the order of the screen.
+fn ranking_order(count: usize, screened: &[Option<Screened>], judged: &[Judged]) -> Vec<usize> {
+    let mut order: Vec<usize> = judged.iter().map(|entry| entry.refitted.candidate).collect();
+    let mut rest: Vec<usize> =
+        (0..count).filter(|index| !order.contains(index) && screened[*index].is_some()).collect();
+    let deviance = |index: usize| screened[index].as_ref().map_or(f64::INFINITY, |entry| entry.deviance);
+    rest.sort_by(|&a, &b| deviance(a).total_cmp(&deviance(b)));
+    order.extend(rest);
+    order
+}
+
+fn entry(round: &Round, candidate: &Candidate, screened: Option<&Screened>) -> Reported {
+    let gain = screened.map_or(0.0, |entry| {
+        let difference = (round.current_deviance() - entry.deviance).max(0.0);
+        1.0 - (-difference / round.effective_total().max(1.0)).exp()
+    });
+    Reported {
+        name: candidate.name.clone(),
+        effect: candidate.effect.clone(),
+        place: candidate.place.clone(),
+        title: candidate.title.clone(),
+        score: screened.and_then(|entry| entry.score),
+        visibility: screened.and_then(|entry| entry.visibility),
+        predicted_gain: gain,
+        refit: None,
+        confidence: None,
+        smallest_detectable: screened.and_then(|entry| entry.smallest_detectable).and_then(|strength| {
+            let unknown = candidate.unknowns.first()?;
+            Some(Unit::coherent(unknown.dimension).format(strength, 2))
+        }),
+    }
+}
+
+fn invisible(candidates: &[Candidate], screened: &[Option<Screened>]) -> Vec<String> {
+    candidates
+        .iter()
+        .zip(screened)
+        .filter(|(_, entry)| {
+            entry.as_ref().and_then(|entry| entry.visibility).is_some_and(|visibility| visibility < MINIMUM_VISIBILITY)
+        })
+        .map(|(candidate, _)| candidate.name.clone())
+        .collect()
+}
+
+fn judgement(judged: &[Judged], chosen: Option<usize>, candidates: &[Candidate], below_visibility: bool) -> String {
+    let name = |entry: &Judged| candidates[entry.refitted.candidate].name.as_str();
+    if below_visibility {
+        return "no candidate changes the measured channels enough to be judged".to_owned();
+    }
+    match (chosen, judged.first()) {
+        (_, None) => "no candidate lowers the misfit".to_owned(),
+        (None, Some(best)) => {
+            let reason = best.report.objection.clone().unwrap_or_default();
+            format!("nothing accepted; best was {}: {reason}", name(best))
+        }
+        (Some(position), _) => {
+            let entry = &judged[position];
+            let change = entry.report.validation_change.map_or(String::new(), |(low, high)| {
+                format!(", held-out error changes by {low:.1} to {high:.1} % (95 %)")
+            });
+            let passed: Vec<String> = judged[..position]
+                .iter()
+                .map(|other| format!("{} ({})", name(other), other.report.objection.clone().unwrap_or_default()))
+                .collect();
+            let before = if passed.is_empty() { String::new() } else { format!("; passed over: {}", passed.join(", ")) };
+            format!("{} accepted: BIC {:+.0}{change}{before}", name(entry), entry.report.bic_difference)
+        }
+    }
+}

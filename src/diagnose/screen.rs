@@ -1,0 +1,178 @@
+//! The screen: every candidate tried at finite strengths with the full nonlinear simulation, the fitted parameters moving
+//! along to first order.
+//!
+//! For each grid point the residual is simulated and what the fitted parameters can absorb (the span of the base gradient)
+//! is projected out; the candidate's rank is the concentrated deviance of what remains. Strengths come from the score at
+//! zero strength (Breusch-Pagan-1980, Rao-1948) where it exists, else from a grid.
+
+use super::candidates::{Candidate, Unknown, UnknownRole};
+use super::round::Round;
+use crate::fit::LeastSquares;
+use crate::identify::Problem;
+use crate::linear::least_squares;
+
+/// Multiples of the strength estimated at zero that are tried.
+const STRENGTH_FACTORS: [f64; 3] = [0.5, 1.0, 2.0];
+
+/// What the screen found for one candidate.
+#[derive(Clone, Debug)]
+pub(super) struct Screened {
+    /// Values of the candidate's unknowns at the best grid point (SI).
+    pub values: Vec<f64>,
+    /// Deviance after projection at the best grid point; infinite where nothing could be simulated.
+    pub deviance: f64,
+    /// Largest score statistic over the shapes, with its degrees of freedom.
+    pub score: Option<(f64, usize)>,
+    /// |s~|/|s| of the first strength, at the best-scoring shape.
+    pub visibility: Option<f64>,
+    /// Strength at which the score would just be significant, SI.
+    pub smallest_detectable: Option<f64>,
+    pub simulations: usize,
+}
+
+/// Screens one candidate. `None` where its variant cannot be built (e.g. the place does not admit it).
+pub(super) fn screen(round: &Round, candidate: &Candidate) -> Option<Screened> {
+    let compiled = round.compile(candidate, &candidate.neutral(), true)?;
+    let mut trial = Trial { round, candidate, problem: round.problem(&compiled) };
+    let mut best = Screened {
+        values: candidate.neutral(),
+        deviance: f64::INFINITY,
+        score: None,
+        visibility: None,
+        smallest_detectable: None,
+        simulations: 0,
+    };
+    for shapes in shape_grid(round, candidate) {
+        for values in trial.strengths(&shapes, &mut best) {
+            if let Some(deviance) = trial.projected_deviance(&values)
+                && deviance < best.deviance
+            {
+                best.deviance = deviance;
+                best.values = values;
+            }
+        }
+    }
+    best.simulations = trial.problem.simulations;
+    Some(best)
+}
+
+/// All combinations of shape values, as full vectors of unknowns with strengths at neutral.
+fn shape_grid(round: &Round, candidate: &Candidate) -> Vec<Vec<f64>> {
+    let mut grid = vec![candidate.neutral()];
+    for (position, unknown) in candidate.unknowns.iter().enumerate() {
+        let values: Vec<f64> = match &unknown.role {
+            UnknownRole::Shape(values) => values.clone(),
+            UnknownRole::Frequency => round.peak_frequencies(unknown.lower, unknown.upper),
+            _ => continue,
+        };
+        grid = grid
+            .into_iter()
+            .flat_map(|point| {
+                values.iter().map(move |&value| {
+                    let mut next = point.clone();
+                    next[position] = value;
+                    next
+                })
+            })
+            .collect();
+    }
+    grid
+}
+
+struct Trial<'a> {
+    round: &'a Round<'a>,
+    candidate: &'a Candidate,
+    problem: Problem<'a>,
+}
+
+impl Trial<'_> {
+    /// Deviance of the projected residual at `values`; `None` where the simulation fails.
+    fn projected_deviance(&mut self, values: &[f64]) -> Option<f64> {
+        let mut residual = self.problem.residual(values).ok()?;
+        self.round.basis.project_out(&mut residual);
+        Some(self.round.deviance(&residual))
+    }
+
+    /// Points to try for one combination of shapes; notes the score on the way.
+    fn strengths(&mut self, shapes: &[f64], best: &mut Screened) -> Vec<Vec<f64>> {
+        let finite = self.candidate.unknowns.iter().position(|u| matches!(u.role, UnknownRole::FiniteAmplitude(_)));
+        if let Some(position) = finite {
+            let UnknownRole::FiniteAmplitude(values) = &self.candidate.unknowns[position].role else {
+                return Vec::new();
+            };
+            return values.iter().map(|&value| with(shapes, position, value)).collect();
+        }
+        let Some(estimate) = self.score(shapes, best) else {
+            return Vec::new();
+        };
+        STRENGTH_FACTORS.iter().map(|factor| self.scaled(shapes, &estimate, *factor)).collect()
+    }
+
+    /// Linear estimate of the strengths at their neutral values; `None` where all have the wrong sign or no influence.
+    fn score(&mut self, shapes: &[f64], best: &mut Screened) -> Option<Vec<(usize, f64)>> {
+        let amplitudes: Vec<usize> = (0..self.candidate.unknowns.len())
+            .filter(|&i| self.candidate.unknowns[i].role == UnknownRole::Amplitude)
+            .collect();
+        let (residual, gradient) = self.problem.residual_and_gradient(shapes).ok()?;
+        let rows = residual.len();
+        let mut projected = Vec::with_capacity(rows * amplitudes.len());
+        let mut shares = Vec::new();
+        for &i in &amplitudes {
+            // The gradient of the residual is minus that of the model; a strength explains what reduces the residual.
+            let mut column: Vec<f64> = gradient[i * rows..(i + 1) * rows].iter().map(|g| -g).collect();
+            let before = norm(&column);
+            self.round.basis.project_out(&mut column);
+            shares.push(if before > 0.0 { norm(&column) / before } else { 0.0 });
+            projected.extend(column);
+        }
+        let remaining = &self.round.projected_residual;
+        let mut estimate = least_squares(&projected, rows, remaining)?;
+        for (value, &i) in estimate.iter_mut().zip(&amplitudes) {
+            let unknown = &self.candidate.unknowns[i];
+            if unknown.neutral + *value < unknown.lower && unknown.lower == unknown.neutral {
+                *value = 0.0;
+            }
+        }
+        let explained = explained_by(&projected, rows, &estimate, remaining);
+        let statistic = self.round.score_scale() * explained / self.round.projected_mean_square();
+        if best.score.is_none_or(|(previous, _)| statistic > previous) {
+            best.score = Some((statistic, amplitudes.len()));
+            best.visibility = shares.first().copied();
+            let column_norm = norm(&projected[..rows]);
+            best.smallest_detectable = self.round.detectable_strength(column_norm);
+        }
+        if estimate.iter().all(|value| *value == 0.0) {
+            return None;
+        }
+        Some(amplitudes.into_iter().zip(estimate).collect())
+    }
+
+    fn scaled(&self, shapes: &[f64], estimate: &[(usize, f64)], factor: f64) -> Vec<f64> {
+        let mut values = shapes.to_vec();
+        for &(i, amplitude) in estimate {
+            let unknown: &Unknown = &self.candidate.unknowns[i];
+            values[i] = (unknown.neutral + factor * amplitude).clamp(unknown.lower, unknown.upper);
+        }
+        values
+    }
+}
+
+/// Decrease of the sum of squares of `target` when `columns * estimate` is taken away.
+fn explained_by(columns: &[f64], rows: usize, estimate: &[f64], target: &[f64]) -> f64 {
+    let mut rest = target.to_vec();
+    for (column, value) in columns.chunks_exact(rows).zip(estimate) {
+        rest.iter_mut().zip(column).for_each(|(r, c)| *r -= value * c);
+    }
+    let square = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
+    (square(target) - square(&rest)).max(0.0)
+}
+
+fn with(values: &[f64], position: usize, value: f64) -> Vec<f64> {
+    let mut changed = values.to_vec();
+    changed[position] = value;
+    changed
+}
+
+fn norm(vector: &[f64]) -> f64 {
+    vector.iter().map(|x| x * x).sum::<f64>().sqrt()
+}

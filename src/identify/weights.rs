@@ -1,0 +1,92 @@
+//! Weights of the channels: first by magnitude, then by the deviation of the residual (method 3.20, IV.6).
+
+use super::problem::Block;
+use crate::signal::Prefilter;
+use crate::simulation::Record;
+use crate::study::Study;
+
+/// Weights per measure and where they come from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weighting {
+    /// 1/SI unit; 0 for measures that no record compares.
+    pub weights: Vec<f64>,
+    /// `stated in the study`, `magnitude of the channel`, `residual of the fit`.
+    pub sources: Vec<&'static str>,
+}
+
+const STATED: &str = "stated in the study";
+const MAGNITUDE: &str = "magnitude of the channel";
+const RESIDUAL: &str = "residual of the fit";
+
+impl Weighting {
+    /// Largest relative change of a weight against `other`, after taking out a common factor.
+    pub fn largest_change(&self, other: &Weighting) -> f64 {
+        let ratios: Vec<f64> = self
+            .weights
+            .iter()
+            .zip(&other.weights)
+            .filter(|(_, old)| **old > 0.0)
+            .map(|(new, old)| (new / old).ln())
+            .collect();
+        let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
+        // A common factor changes nothing but the meaning of the cost; one change of that is always wanted.
+        let first = self.sources != other.sources;
+        let spread = ratios.iter().map(|ratio| (ratio - mean).abs()).fold(0.0, f64::max);
+        if first { f64::INFINITY } else { spread }
+    }
+}
+
+/// Weights before any fit: the noise where the study states it, else the channel's deviation from its mean.
+pub(super) fn first_weights(study: &Study, records: &[&Record], filters: &[Prefilter]) -> Weighting {
+    let count = study.measures.len();
+    let mut squares = vec![0.0; count];
+    let mut samples = vec![0usize; count];
+    for (record, filter) in records.iter().zip(filters) {
+        for (c, &measure) in record.measures.iter().enumerate() {
+            let mut channel = record.measured[c].clone();
+            let mean = channel.iter().sum::<f64>() / channel.len().max(1) as f64;
+            channel.iter_mut().for_each(|value| *value -= mean);
+            filter.apply(&mut channel);
+            squares[measure] += channel.iter().map(|value| value * value).sum::<f64>();
+            samples[measure] += channel.len();
+        }
+    }
+    let mut weighting = Weighting { weights: vec![0.0; count], sources: vec![MAGNITUDE; count] };
+    for (measure, declared) in study.measures.iter().enumerate() {
+        if let Some(noise) = declared.noise {
+            weighting.weights[measure] = declared.weight / noise;
+            weighting.sources[measure] = STATED;
+        } else if squares[measure] > 0.0 {
+            weighting.weights[measure] = declared.weight / (squares[measure] / samples[measure] as f64).sqrt();
+        }
+    }
+    weighting
+}
+
+/// Weights from the residual of a fit with `parameter_count` parameters; stated noise stays.
+pub(super) fn residual_deviations(
+    current: &Weighting,
+    study: &Study,
+    residual: &[f64],
+    blocks: &[Block],
+    parameter_count: usize,
+) -> Weighting {
+    let mut next = current.clone();
+    // Each channel pays its share of the fitted parameters (method 4.5).
+    let free = 1.0 - parameter_count as f64 / residual.len().max(parameter_count + 1) as f64;
+    for (measure, declared) in study.measures.iter().enumerate() {
+        if declared.noise.is_some() || current.weights[measure] == 0.0 {
+            continue;
+        }
+        let rows: Vec<&[f64]> =
+            blocks.iter().filter(|block| block.measure == measure).map(|block| &residual[block.rows.clone()]).collect();
+        let squares: f64 = rows.iter().flat_map(|row| row.iter()).map(|value| value * value).sum();
+        let count: usize = rows.iter().map(|row| row.len()).sum();
+        let deviation = (squares / (count as f64 * free)).sqrt() / current.weights[measure];
+        if deviation > 0.0 {
+            next.weights[measure] = declared.weight / deviation;
+            next.sources[measure] = RESIDUAL;
+        }
+    }
+    next
+}

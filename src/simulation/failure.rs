@@ -1,0 +1,75 @@
+//! A failed simulation as a value.
+
+use std::fmt;
+
+/// Why a record could not be simulated with these parameters, in the study's words.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    pub experiment: String,
+    /// s
+    pub time: f64,
+    /// One clause, e.g. `the step size shrank to rounding level`.
+    pub cause: String,
+    /// State to blame, e.g. `slide.velocity`.
+    pub component: Option<String>,
+    pub help: String,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "experiment {}: {} at t = {:.6} s", self.experiment, self.cause, self.time)?;
+        if let Some(component) = &self.component {
+            write!(formatter, ", limited by {component}")?;
+        }
+        Ok(())
+    }
+}
+
+impl Failure {
+    /// From the integrator's failure, with component names put in.
+    pub fn from_integration(
+        experiment: &str,
+        failure: &crate::integrate::Failure,
+        name: impl Fn(usize) -> String,
+    ) -> Self {
+        use crate::integrate::FailureCause as Cause;
+        let (cause, help) = match failure.cause {
+            Cause::StepTooSmall => (
+                "the step size shrank to rounding level",
+                "look for a law that jumps, or a parameter start value far from reality; a larger creep or knee makes a law smoother",
+            ),
+            Cause::NoConvergence => (
+                "the equations of a step could not be solved",
+                "look for a law that jumps or has a vertical slope; a larger creep or knee makes a law smoother",
+            ),
+            Cause::InvalidRequest => ("the simulation was asked for impossible times", "check the record's time column"),
+            Cause::TooManySteps => (
+                "the number of steps exceeded its limit",
+                "the model is much faster than the record; check stiffnesses and masses, or loosen `solver { tolerance = .. }`",
+            ),
+            Cause::NotFinite => (
+                "the solution became infinite or not a number",
+                "the model is unstable with these parameters (wrong sign, missing damping, division by zero); narrow the bounds",
+            ),
+            Cause::SingularMatrix => (
+                "the equations are singular",
+                "a mass, inertia or law leaves this state undetermined",
+            ),
+            Cause::InconsistentStart => (
+                "no consistent start values exist",
+                "the start values contradict each other; give fewer of them",
+            ),
+            Cause::NoEquilibrium => (
+                "no equilibrium was found",
+                "a body that can move without any restoring force has no equilibrium: use `start = rest { .. }` with values",
+            ),
+        };
+        Self {
+            experiment: experiment.to_owned(),
+            time: failure.time,
+            cause: cause.to_owned(),
+            component: failure.component.map(name),
+            help: help.to_owned(),
+        }
+    }
+}

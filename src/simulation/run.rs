@@ -1,0 +1,196 @@
+//! One record simulated.
+
+use super::failure::Failure;
+use super::prepare::Record;
+use crate::diagnostics::Diagnostic;
+use crate::expression::Symbol;
+use crate::integrate::{self, Dynamics, MethodChoice, Options, Solution, Start, Work};
+use crate::mechanics::{self, System};
+use crate::study::{Method, Study};
+use crate::tape::{Bound, Model};
+
+/// A study with its equations and closures.
+#[derive(Clone, Debug)]
+pub struct Compiled {
+    pub study: Study,
+    pub system: System,
+    pub model: Model,
+}
+
+impl Compiled {
+    /// # Errors
+    /// What makes the mechanism impossible, in the study's words.
+    pub fn new(study: Study) -> Result<Self, Vec<Diagnostic>> {
+        let system = mechanics::derive(&study)?;
+        let model = Model::compile(&system);
+        Ok(Self { study, system, model })
+    }
+
+    /// As [`Compiled::new`], with the named parameters held at these values (SI): they become constants of the equations.
+    ///
+    /// # Errors
+    /// As [`Compiled::new`].
+    pub fn frozen(mut study: Study, fixed: &[(String, f64)]) -> Result<Self, Vec<Diagnostic>> {
+        let symbols: Vec<(Symbol, f64)> = study
+            .parameters
+            .iter()
+            .filter_map(|parameter| {
+                let (_, value) = fixed.iter().find(|(name, _)| *name == parameter.name)?;
+                Some((parameter.symbol, *value))
+            })
+            .collect();
+        study.parameters.retain(|parameter| fixed.iter().all(|(name, _)| *name != parameter.name));
+        let mut system = mechanics::derive(&study)?;
+        system.freeze(&symbols);
+        let model = Model::compile(&system);
+        Ok(Self { study, system, model })
+    }
+}
+
+/// Whether the gradient is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gradient {
+    None,
+    AllParameters,
+}
+
+/// The model's answer to one record, SI, at the compared samples.
+#[derive(Clone, Debug)]
+pub struct Trajectory {
+    /// One per measure of the record: N samples.
+    pub channels: Vec<Vec<f64>>,
+    /// One per measure of the record: N x p column-major; empty where no gradient was asked for.
+    pub gradient: Vec<Vec<f64>>,
+    /// Place probes (`System::probes`), each N samples; empty unless [`probe`] filled them.
+    pub probes: Vec<Vec<f64>>,
+    pub work: Work,
+}
+
+/// Simulates `record` with parameters `theta` (SI, length p).
+///
+/// # Errors
+/// [`Failure`] with time, cause and the state to blame.
+pub fn simulate(
+    compiled: &Compiled,
+    record: &Record,
+    theta: &[f64],
+    gradient: Gradient,
+) -> Result<Trajectory, Failure> {
+    run(compiled, record, theta, gradient, false)
+}
+
+/// As [`simulate`] without gradient, and with the place probes along the solution.
+///
+/// # Errors
+/// [`Failure`] with time, cause and the state to blame.
+pub fn probe(compiled: &Compiled, record: &Record, theta: &[f64]) -> Result<Trajectory, Failure> {
+    run(compiled, record, theta, Gradient::None, true)
+}
+
+fn run(
+    compiled: &Compiled,
+    record: &Record,
+    theta: &[f64],
+    gradient: Gradient,
+    with_probes: bool,
+) -> Result<Trajectory, Failure> {
+    let with_gradient = gradient == Gradient::AllParameters;
+    let mut bound = Bound::new(&compiled.model, &record.inputs, theta);
+    let name = |i: usize| compiled.model.variables()[i].name.clone();
+    let blame = |failure: integrate::Failure| Failure::from_integration(&record.name, &failure, name);
+    let start = start(&mut bound, record, with_gradient).map_err(blame)?;
+    let options = options(&compiled.study);
+    let solution =
+        integrate::integrate(&mut bound, &start, &record.times, &record.breakpoints, &options).map_err(blame)?;
+    let (channels, gradients) = outputs(&mut bound, record, &solution, with_gradient);
+    let finite = channels.iter().flatten().chain(gradients.iter().flatten()).all(|value| value.is_finite());
+    if !finite {
+        return Err(Failure {
+            experiment: record.name.clone(),
+            time: record.times.last().copied().unwrap_or(start.time),
+            cause: "a measured quantity became infinite or not a number".to_owned(),
+            component: None,
+            help: "a measure divides by zero or takes the root of a negative number".to_owned(),
+        });
+    }
+    let probes = if with_probes { probes(&mut bound, record, &solution) } else { Vec::new() };
+    Ok(Trajectory { channels, gradient: gradients, probes, work: solution.work })
+}
+
+fn start(bound: &mut Bound, record: &Record, with_gradient: bool) -> Result<Start, integrate::Failure> {
+    let t0 = record.start_time();
+    let given = bound.start_values(record.experiment, t0);
+    let (mut y, mut sensitivity) = (given.values, given.derivatives);
+    if given.equilibrium.contains(&true) {
+        let balanced = integrate::equilibrium(bound, t0, &y, &sensitivity, &given.equilibrium)?;
+        y = balanced.y;
+        sensitivity = balanced.sensitivity;
+    }
+    if !with_gradient {
+        sensitivity.clear();
+    }
+    let mut y_prime = vec![0.0; y.len()];
+    bound.explicit_rates(t0, &y, &mut y_prime);
+    Ok(Start { time: t0, y, y_prime, sensitivity })
+}
+
+fn options(study: &Study) -> Options {
+    Options {
+        relative_tolerance: study.solver.relative_tolerance,
+        method: match study.solver.method {
+            Method::Automatic => MethodChoice::Automatic,
+            Method::Bdf => MethodChoice::Bdf,
+            Method::RungeKutta => MethodChoice::RungeKutta,
+        },
+        ..Options::default()
+    }
+}
+
+/// Measured channels (and their gradient) at the compared samples, from the solution at all sample times.
+fn outputs(
+    bound: &mut Bound,
+    record: &Record,
+    solution: &Solution,
+    with_gradient: bool,
+) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+    let model = bound.model();
+    let (n, m, p) = (model.dimension(), model.output_count(), model.parameter_count());
+    let samples = record.sample_count();
+    let mut values = vec![0.0; m];
+    let mut slopes = vec![0.0; m * p];
+    let mut channels = vec![vec![0.0; samples]; record.measures.len()];
+    let mut gradients = vec![vec![0.0; if with_gradient { samples * p } else { 0 }]; record.measures.len()];
+    for k in 0..samples {
+        let row = record.first + k;
+        let (t, y) = (solution.times[row], &solution.y[row * n..(row + 1) * n]);
+        bound.outputs(t, y, &mut values);
+        if with_gradient {
+            let block = &solution.sensitivity[row * n * p..(row + 1) * n * p];
+            bound.output_sensitivity(t, y, block, &mut slopes);
+        }
+        for (c, &measure) in record.measures.iter().enumerate() {
+            channels[c][k] = values[measure];
+            if with_gradient {
+                for j in 0..p {
+                    gradients[c][j * samples + k] = slopes[j * m + measure];
+                }
+            }
+        }
+    }
+    (channels, gradients)
+}
+
+fn probes(bound: &mut Bound, record: &Record, solution: &Solution) -> Vec<Vec<f64>> {
+    let model = bound.model();
+    let (n, count) = (model.dimension(), model.probe_count());
+    let mut values = vec![0.0; count];
+    let mut histories = vec![vec![0.0; record.sample_count()]; count];
+    for k in 0..record.sample_count() {
+        let row = record.first + k;
+        bound.probes(solution.times[row], &solution.y[row * n..(row + 1) * n], &mut values);
+        for (history, value) in histories.iter_mut().zip(&values) {
+            history[k] = *value;
+        }
+    }
+    histories
+}
