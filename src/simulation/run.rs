@@ -39,9 +39,9 @@ impl Compiled {
                 Some((parameter.symbol, *value))
             })
             .collect();
-        study.parameters.retain(|parameter| fixed.iter().all(|(name, _)| *name != parameter.name));
         let mut system = mechanics::derive(&study)?;
         system.freeze(&symbols);
+        study.parameters.retain(|parameter| fixed.iter().all(|(name, _)| *name != parameter.name));
         let model = Model::compile(&system);
         Ok(Self { study, system, model })
     }
