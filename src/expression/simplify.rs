@@ -310,7 +310,7 @@ fn whole_power(graph: &mut Graph, base: Node, n: u32) -> Node {
     }
     let half = whole_power(graph, base, n / 2);
     let square = graph.multiply(half, half);
-    if n % 2 == 0 { square } else { graph.multiply(square, base) }
+    if n.is_multiple_of(2) { square } else { graph.multiply(square, base) }
 }
 
 impl Unary {

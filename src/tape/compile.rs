@@ -260,16 +260,21 @@ impl<'a> Assembler<'a> {
 
     /// Orders nodes so that equal instructions follow each other: always the instruction with most nodes ready.
     fn schedule(&self, nodes: &[Node]) -> Vec<Node> {
-        let position: HashMap<Node, usize> = nodes.iter().enumerate().map(|(i, &node)| (node, i)).collect();
+        let mut position = vec![usize::MAX; nodes.last().map_or(0, |node| node.index() + 1)];
+        nodes.iter().enumerate().for_each(|(i, node)| position[node.index()] = i);
         let mut waiting = vec![0_usize; nodes.len()];
-        let mut readers: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
+        // Readers of each node as linked lists in one vector of (reader, next).
+        let mut first_reader = vec![usize::MAX; nodes.len()];
+        let mut readers: Vec<(usize, usize)> = Vec::with_capacity(2 * nodes.len());
         let mut ready: BTreeMap<Instruction, Vec<usize>> = BTreeMap::new();
         for (i, &node) in nodes.iter().enumerate() {
             let operation = self.graph.operation(node);
             for child in operation.children() {
-                if let Some(&child) = position.get(&child) {
+                let child = position[child.index()];
+                if child != usize::MAX {
                     waiting[i] += 1;
-                    readers[child].push(i);
+                    readers.push((i, first_reader[child]));
+                    first_reader[child] = readers.len() - 1;
                 }
             }
             if waiting[i] == 0
@@ -286,7 +291,10 @@ impl<'a> Assembler<'a> {
                 let i = queue[head];
                 head += 1;
                 order.push(nodes[i]);
-                for &reader in &readers[i] {
+                let mut edge = first_reader[i];
+                while edge != usize::MAX {
+                    let (reader, next_edge) = readers[edge];
+                    edge = next_edge;
                     waiting[reader] -= 1;
                     if waiting[reader] > 0 {
                         continue;

@@ -129,28 +129,21 @@ impl Model {
         for element in &self.output_by_state.elements {
             influences[element.column as usize][element.row as usize] = true;
         }
+        let add = |to: &mut Vec<bool>, from: &[bool]| to.iter_mut().zip(from).for_each(|(to, from)| *to |= from);
         // Influence travels from a variable to all whose equation contains it; n rounds reach everything.
         for _ in 0..n {
             for element in &self.jacobian.elements {
-                let (row, column) = (element.row as usize, element.column as usize);
-                for output in 0..m {
-                    influences[column][output] |= influences[row][output];
-                }
+                let of_equation = influences[element.row as usize].clone();
+                add(&mut influences[element.column as usize], &of_equation);
             }
         }
         let mut reach = vec![vec![false; m]; p];
         for element in &self.output_by_parameter.elements {
             reach[element.column as usize][element.row as usize] = true;
         }
-        for element in &self.parameter_derivative.elements {
-            for output in 0..m {
-                reach[element.column as usize][output] |= influences[element.row as usize][output];
-            }
-        }
-        for element in self.starts.iter().flat_map(|start| &start.elements) {
-            for output in 0..m {
-                reach[element.column as usize][output] |= influences[element.row as usize][output];
-            }
+        let of_states = self.parameter_derivative.elements.iter().chain(self.starts.iter().flat_map(|s| &s.elements));
+        for element in of_states {
+            add(&mut reach[element.column as usize], &influences[element.row as usize]);
         }
         reach
     }
