@@ -62,9 +62,8 @@ fn parameters(compiled: &Compiled, given: &[String]) -> Result<Vec<f64>, Failed>
 
 /// Time and simulated channels in the study's units as CSV.
 fn table(compiled: &Compiled, record: &Record, theta: &[f64]) -> Result<String, String> {
-    let trajectory = simulate(compiled, record, theta, Gradient::None).map_err(|failure| {
-        format!("{failure}\nhelp: {}", failure.help)
-    })?;
+    let trajectory = simulate(compiled, record, theta, Gradient::None)
+        .map_err(|failure| format!("{failure}\nhelp: {}", failure.help))?;
     let mut writer = csv::Writer::from_writer(Vec::new());
     let measures = record.measures.iter().map(|&measure| &compiled.study.measures[measure]);
     let mut head = vec!["t [s]".to_owned()];

@@ -3,7 +3,7 @@
 
 use super::typical::Typical;
 use crate::quantities::{Dimension, Unit};
-use crate::study::{EffectDeclaration, EffectParameter, Place, PlaceKind, PlaceQuantity, Study};
+use crate::study::{EffectDeclaration, EffectParameter, ForcePlace, Place, PlaceKind, PlaceQuantity, Study};
 use std::fmt::Write;
 
 /// Amplitudes of effects that declare no range may grow to this multiple of their natural scale.
@@ -111,7 +111,7 @@ pub(super) fn candidates(study: &Study, typical: &[Typical]) -> Vec<Candidate> {
     let mut list = Vec::new();
     for effect in &study.effects {
         for (place, typical) in study.places.iter().zip(typical) {
-            if fits(effect, place) {
+            if fits(effect, place) && !stands_at_joint(study, effect, place) {
                 list.extend(effect_candidate(study, effect, place, typical));
             }
         }
@@ -126,12 +126,14 @@ fn fits(effect: &EffectDeclaration, place: &Place) -> bool {
         && effect.dimension.is_none_or(|dimension| dimension == place.dimension)
 }
 
-fn effect_candidate(
-    study: &Study,
-    effect: &EffectDeclaration,
-    place: &Place,
-    typical: &Typical,
-) -> Option<Candidate> {
+/// What an effect adds at a force element on a joint it adds at the joint itself; effects known at both are tried once.
+fn stands_at_joint(study: &Study, effect: &EffectDeclaration, place: &Place) -> bool {
+    let on_joint =
+        study.forces.iter().any(|force| force.name == place.name && matches!(force.place, ForcePlace::Joint(_)));
+    on_joint && effect.kinds.contains(&PlaceKind::Joint)
+}
+
+fn effect_candidate(study: &Study, effect: &EffectDeclaration, place: &Place, typical: &Typical) -> Option<Candidate> {
     let element = unused_name(study, &format!("{}_{}", place.name.replace('.', "_"), effect.name));
     let mut unknowns = Vec::new();
     for parameter in &effect.amplitudes {
@@ -193,7 +195,8 @@ fn amplitude(element: &str, parameter: &EffectParameter, place: &Place, typical:
     let scale = if parameter.monomial.is_empty() { None } else { Some(natural_scale(parameter, typical)?) };
     let relative = parameter.relative_range.zip(scale).map(|((low, high), scale)| (low * scale, high * scale));
     let reach = scale.unwrap_or(1.0) * AMPLITUDE_REACH;
-    let (mut lower, upper) = parameter.range.or(relative).unwrap_or((parameter.neutral - reach, parameter.neutral + reach));
+    let (mut lower, upper) =
+        parameter.range.or(relative).unwrap_or((parameter.neutral - reach, parameter.neutral + reach));
     if parameter.one_sided {
         lower = lower.max(parameter.neutral);
     }

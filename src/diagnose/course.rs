@@ -1,13 +1,13 @@
 //! From the rounds that were run to the answer.
 
 use super::candidates::Candidate;
-use crate::quantities::Unit;
 use super::judge::{self, Judged};
 use super::records::Roles;
 use super::round::Round;
 use super::screen::Screened;
 use super::{Answer, Candidate as Reported, ChannelAnatomy, MissingForce, Step, Verdict};
 use crate::identify::Identification;
+use crate::quantities::Unit;
 use crate::simulation::Compiled;
 
 /// Candidates shown in the ranking of a step.
@@ -51,8 +51,8 @@ impl Course {
         if self.steps.is_empty() {
             self.cannot_judge = invisible(candidates, screened);
         }
-        let accepted = chosen
-            .and_then(|position| order.iter().position(|&index| index == judged[position].refitted.candidate));
+        let accepted =
+            chosen.and_then(|position| order.iter().position(|&index| index == judged[position].refitted.candidate));
         let judgement = judgement(judged, chosen, candidates, self.below_visibility);
         reported.truncate(SHOWN);
         self.steps.push(Step {
@@ -216,7 +216,8 @@ fn judgement(judged: &[Judged], chosen: Option<usize>, candidates: &[Candidate],
                 .iter()
                 .map(|other| format!("{} ({})", name(other), other.report.objection.clone().unwrap_or_default()))
                 .collect();
-            let before = if passed.is_empty() { String::new() } else { format!("; passed over: {}", passed.join(", ")) };
+            let before =
+                if passed.is_empty() { String::new() } else { format!("; passed over: {}", passed.join(", ")) };
             format!("{} accepted: BIC {:+.0}{change}{before}", name(entry), entry.report.bic_difference)
         }
     }

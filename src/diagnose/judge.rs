@@ -4,8 +4,8 @@ use super::candidates::{Candidate, UnknownRole};
 use super::refit::Refitted;
 use super::round::{Round, deviance, effective_counts};
 use super::{Candidate as Reported, Refit};
-use crate::identify::{Fitted, Problem, confidence, prefilters};
 use crate::fit::LeastSquares;
+use crate::identify::{Fitted, Problem, confidence, prefilters};
 use crate::simulation::{Compiled, Record};
 use crate::statistics::{ErrorChange, block_length, chi_square_p, error_change};
 
@@ -69,9 +69,7 @@ impl<'a> HeldOut<'a> {
             let samples = record.sample_count();
             let channels = record.measures.len();
             let sum = |values: &[f64]| -> Vec<f64> {
-                (0..samples)
-                    .map(|k| (0..channels).map(|c| values[offset + c * samples + k].powi(2)).sum())
-                    .collect()
+                (0..samples).map(|k| (0..channels).map(|c| values[offset + c * samples + k].powi(2)).sum()).collect()
             };
             records.push((sum(&self.residual), sum(residual)));
             offset += samples * channels;
@@ -117,8 +115,8 @@ pub(super) fn judge(
     let measures = round.compiled.study.measures.len();
     let effective = effective_counts(measures, round.fitted, &best.fitted.residual);
     let total: f64 = effective.iter().sum();
-    let base_bic = deviance(round.fitted, &round.fitted.residual, &effective)
-        + round.fitted.theta.len() as f64 * total.ln();
+    let base_bic =
+        deviance(round.fitted, &round.fitted.residual, &effective) + round.fitted.theta.len() as f64 * total.ln();
     let mut judged: Vec<Judged> = refits
         .into_iter()
         .map(|refitted| {
@@ -188,7 +186,9 @@ fn candidate_parameters(refitted: &Refitted, candidate: &Candidate) -> Vec<(Stri
         .filter_map(|unknown| {
             let index = refitted.compiled.study.parameters.iter().position(|p| p.name == unknown.target)?;
             let parameter = &refitted.compiled.study.parameters[index];
-            let interval = confidence.interval(index).map(|(low, high)| (parameter.unit.from_si(low), parameter.unit.from_si(high)));
+            let interval = confidence
+                .interval(index)
+                .map(|(low, high)| (parameter.unit.from_si(low), parameter.unit.from_si(high)));
             let value = parameter.unit.from_si(refitted.fitted.theta[index]);
             Some((parameter.name.clone(), value, interval, parameter.unit.symbol.clone()))
         })

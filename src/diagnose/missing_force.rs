@@ -65,8 +65,7 @@ fn missing_force(source: &Source, record: &Record, place: &Place) -> Option<Miss
     let mut problem = Problem::new(&compiled, vec![record], filters, source.weighting.weights.clone());
     let (residual, gradient) = problem.residual_and_gradient(&vec![0.0; names]).ok()?;
     let sensitivity: Vec<f64> = gradient.iter().map(|value| -value).collect();
-    let independent: f64 =
-        problem.blocks().iter().map(|block| effective_count(&residual[block.rows.clone()])).sum();
+    let independent: f64 = problem.blocks().iter().map(|block| effective_count(&residual[block.rows.clone()])).sum();
     // Model error is not noise: its own colour must not forbid resolving it.
     let independent = independent.max(2.0 * names as f64);
     let (force, share) = smooth_least_squares(&sensitivity, residual.len(), &residual, independent)?;
@@ -100,7 +99,16 @@ fn with_free_force(study: &Study, place: &Place, knots: &[f64]) -> Option<(Study
         load = free.graph.add(load, term);
         let unit = Unit::coherent(place.dimension);
         let (lower, upper) = (f64::NEG_INFINITY, f64::INFINITY);
-        free.parameters.push(Parameter { name, symbol, unit, lower, upper, start: 0.0, prior: None, span: Default::default() });
+        free.parameters.push(Parameter {
+            name,
+            symbol,
+            unit,
+            lower,
+            upper,
+            start: 0.0,
+            prior: None,
+            span: Default::default(),
+        });
     }
     let coordinate = free.graph.symbol("missing force coordinate");
     let rate = free.graph.symbol("missing force rate");

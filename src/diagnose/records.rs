@@ -21,9 +21,8 @@ impl Roles {
     pub(super) fn assign(records: &[Record]) -> Self {
         let of = |role: Role| records.iter().filter(|record| record.role == role).cloned().collect::<Vec<_>>();
         let (mut estimation, mut validation, test) = (of(Role::Estimation), of(Role::Validation), of(Role::Test));
-        let names = |records: &[Record]| {
-            records.iter().map(|record| record.name.as_str()).collect::<Vec<_>>().join(", ")
-        };
+        let names =
+            |records: &[Record]| records.iter().map(|record| record.name.as_str()).collect::<Vec<_>>().join(", ");
         let mut description;
         if validation.is_empty() {
             description = format!(

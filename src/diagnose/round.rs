@@ -73,7 +73,11 @@ impl<'a> Round<'a> {
             .parameters
             .iter()
             .map(|parameter| {
-                known.iter().rev().find(|(name, _)| *name == parameter.name).map_or(parameter.start, |(_, value)| *value)
+                known
+                    .iter()
+                    .rev()
+                    .find(|(name, _)| *name == parameter.name)
+                    .map_or(parameter.start, |(_, value)| *value)
             })
             .collect()
     }

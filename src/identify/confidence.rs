@@ -4,6 +4,7 @@ use super::fitting::Fitted;
 use crate::signal::{autocovariance, effective_count};
 use crate::simulation::Compiled;
 use crate::statistics::{Covariance, confidence_interval, identifiability, stationary_noise_gamma};
+use crate::study::Parameter;
 
 /// Level of all intervals.
 const LEVEL: f64 = 0.95;
@@ -64,17 +65,14 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     if count == 0 {
         return confidence;
     }
-    let scales: Vec<f64> = parameters
-        .iter()
-        .map(|parameter| {
-            let width = parameter.upper - parameter.lower;
-            if width.is_finite() && width > 0.0 { width } else { 1.0 }
-        })
-        .collect();
+    let scales: Vec<f64> = parameters.iter().map(Parameter::scale).collect();
     let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
     let gradient = gradient_with_priors(compiled, fitted);
-    let noise: Vec<(usize, Vec<f64>)> =
-        fitted.blocks.iter().map(|block| (block.rows.len(), bartlett_autocovariance(fitted, block.rows.clone()))).collect();
+    let noise: Vec<(usize, Vec<f64>)> = fitted
+        .blocks
+        .iter()
+        .map(|block| (block.rows.len(), bartlett_autocovariance(fitted, block.rows.clone())))
+        .collect();
     let gamma = stationary_noise_gamma(&gradient, count, &noise);
     if let Ok(analysis) = identifiability(&gradient, &scales, &fitted.theta, &names, RANK_THRESHOLD) {
         confidence.undetermined = analysis.undetermined.iter().map(|direction| direction.description.clone()).collect();

@@ -133,8 +133,12 @@ fn minimise(
     if let Some(limit) = settings.maximum_iterations {
         options.maximum_iterations = limit;
     }
-    let start: Vec<f64> =
-        start.iter().zip(&bounds.lower).zip(&bounds.upper).map(|((value, low), high)| value.clamp(*low, *high)).collect();
+    let start: Vec<f64> = start
+        .iter()
+        .zip(&bounds.lower)
+        .zip(&bounds.upper)
+        .map(|((value, low), high)| value.clamp(*low, *high))
+        .collect();
     let mut with_priors = WithPriors { problem, priors: &priors };
     levenberg_marquardt(&mut with_priors, &start, &bounds, &options, observer)
         .map_err(|error| start_failure(compiled, &error))
@@ -161,8 +165,7 @@ fn finish(
     let (rows, all_rows) = (problem.residual_count(), estimate.residual.len());
     let gradient = estimate.gradient.chunks_exact(all_rows).flat_map(|column| &column[..rows]).copied().collect();
     estimate.residual.truncate(rows);
-    let at_bound =
-        estimate.bound_states.iter().map(|state| *state != crate::fit::BoundState::Interior).collect();
+    let at_bound = estimate.bound_states.iter().map(|state| *state != crate::fit::BoundState::Interior).collect();
     Fitted {
         theta: estimate.theta,
         weighting,

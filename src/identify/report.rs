@@ -127,12 +127,9 @@ fn record_fit(compiled: &Compiled, fitted: &Fitted, record: &Record) -> Result<(
     let of_measure = |values: &[f64], measure: usize| -> f64 {
         record.measures.iter().position(|&m| m == measure).map_or(0.0, |c| values[c])
     };
-    let tree = discrepancy_tree(
-        compiled,
-        &compiled.study.groups,
-        &record.measures,
-        &|measure| (of_measure(&squares, measure), of_measure(&mean_squares, measure)),
-    );
+    let tree = discrepancy_tree(compiled, &compiled.study.groups, &record.measures, &|measure| {
+        (of_measure(&squares, measure), of_measure(&mean_squares, measure))
+    });
     let channels = (0..record.measures.len())
         .map(|c| channel_fit(compiled, fitted, record, trajectory, c, 100.0 * squares[c] / mean_squares[c]))
         .collect();

@@ -10,12 +10,7 @@ const STRENGTHS: [f64; 13] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e
 /// rows (coloured residuals have fewer than `rows`).
 ///
 /// Returns the solution and the share of the target's sum of squares that it explains; `None` for non-finite input.
-pub fn smooth_least_squares(
-    columns: &[f64],
-    rows: usize,
-    target: &[f64],
-    independent: f64,
-) -> Option<(Vec<f64>, f64)> {
+pub fn smooth_least_squares(columns: &[f64], rows: usize, target: &[f64], independent: f64) -> Option<(Vec<f64>, f64)> {
     if rows == 0 || columns.iter().chain(target).any(|value| !value.is_finite()) {
         return None;
     }
@@ -75,9 +70,8 @@ mod tests {
                 columns[j * count + i] = 1.0;
             }
         }
-        let target: Vec<f64> = (0..count)
-            .map(|i| truth[..=i].iter().sum::<f64>() + 0.05 * ((i * 7919 % 13) as f64 / 6.0 - 1.0))
-            .collect();
+        let target: Vec<f64> =
+            (0..count).map(|i| truth[..=i].iter().sum::<f64>() + 0.05 * ((i * 7919 % 13) as f64 / 6.0 - 1.0)).collect();
         let (solution, share) = smooth_least_squares(&columns, count, &target, count as f64).expect("finite");
         let error: f64 = solution.iter().zip(&truth).map(|(s, t)| (s - t).powi(2)).sum::<f64>() / count as f64;
         assert!(error.sqrt() < 0.15, "{error}");

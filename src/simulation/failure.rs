@@ -42,7 +42,9 @@ impl Failure {
                 "the equations of a step could not be solved",
                 "look for a law that jumps or has a vertical slope; a larger creep or knee makes a law smoother",
             ),
-            Cause::InvalidRequest => ("the simulation was asked for impossible times", "check the record's time column"),
+            Cause::InvalidRequest => {
+                ("the simulation was asked for impossible times", "check the record's time column")
+            }
             Cause::TooManySteps => (
                 "the number of steps exceeded its limit",
                 "the model is much faster than the record; check stiffnesses and masses, or loosen `solver { tolerance = .. }`",
@@ -51,14 +53,12 @@ impl Failure {
                 "the solution became infinite or not a number",
                 "the model is unstable with these parameters (wrong sign, missing damping, division by zero); narrow the bounds",
             ),
-            Cause::SingularMatrix => (
-                "the equations are singular",
-                "a mass, inertia or law leaves this state undetermined",
-            ),
-            Cause::InconsistentStart => (
-                "no consistent start values exist",
-                "the start values contradict each other; give fewer of them",
-            ),
+            Cause::SingularMatrix => {
+                ("the equations are singular", "a mass, inertia or law leaves this state undetermined")
+            }
+            Cause::InconsistentStart => {
+                ("no consistent start values exist", "the start values contradict each other; give fewer of them")
+            }
             Cause::NoEquilibrium => (
                 "no equilibrium was found",
                 "a body that can move without any restoring force has no equilibrium: use `start = rest { .. }` with values",

@@ -6,7 +6,7 @@ use crate::diagnostics::Diagnostic;
 use crate::expression::Symbol;
 use crate::integrate::{self, Dynamics, MethodChoice, Options, Solution, Start, Work};
 use crate::mechanics::{self, System};
-use crate::study::{Method, Study};
+use crate::study::{Method, Parameter, Study};
 use crate::tape::{Bound, Model};
 
 /// A study with its equations and closures.
@@ -96,6 +96,7 @@ fn run(
 ) -> Result<Trajectory, Failure> {
     let with_gradient = gradient == Gradient::AllParameters;
     let mut bound = Bound::new(&compiled.model, &record.inputs, theta);
+    bound.set_parameter_scale(compiled.study.parameters.iter().map(Parameter::scale).collect());
     let name = |i: usize| compiled.model.variables()[i].name.clone();
     let blame = |failure: integrate::Failure| Failure::from_integration(&record.name, &failure, name);
     let start = start(&mut bound, record, with_gradient).map_err(blame)?;

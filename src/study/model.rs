@@ -59,6 +59,21 @@ pub struct Parameter {
     pub span: Span,
 }
 
+impl Parameter {
+    /// Typical variation, SI, positive: the width of the bounds where it is finite, else the size of the start value (1
+    /// where that is zero).
+    pub fn scale(&self) -> f64 {
+        let width = self.upper - self.lower;
+        if width.is_finite() && width > 0.0 {
+            width
+        } else if self.start != 0.0 {
+            self.start.abs()
+        } else {
+            1.0
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 pub struct Prior {
     pub mean: f64,

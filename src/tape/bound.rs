@@ -14,6 +14,7 @@ pub struct Bound<'a> {
     registers: Vec<f64>,
     /// Whether the registers hold the rates at the time and variables that stand in them.
     is_current: bool,
+    parameter_scale: Vec<f64>,
 }
 
 /// Start values as far as they are given; see [`Bound::start_values`].
@@ -30,7 +31,8 @@ pub struct StartValues {
 impl<'a> Bound<'a> {
     /// `theta`: parameter values (SI) in the order of [`Model::parameter_names`]; missing ones are NaN.
     pub fn new(model: &'a Model, inputs: &'a dyn InputSource, theta: &[f64]) -> Self {
-        let mut bound = Self { model, inputs, registers: model.registers.clone(), is_current: false };
+        let mut bound =
+            Self { model, inputs, registers: model.registers.clone(), is_current: false, parameter_scale: Vec::new() };
         bound.set_parameters(theta);
         bound
     }
@@ -43,6 +45,12 @@ impl<'a> Bound<'a> {
         }
         self.model.prologue.execute(&mut self.registers, self.inputs);
         self.is_current = false;
+    }
+
+    /// Tells typical magnitudes of the parameters (SI, positive, length p), by which the integrator judges errors of
+    /// sensitivities.
+    pub fn set_parameter_scale(&mut self, scale: Vec<f64>) {
+        self.parameter_scale = scale;
     }
 
     pub fn model(&self) -> &'a Model {
@@ -177,6 +185,10 @@ impl Dynamics for Bound<'_> {
 
     fn scale(&self) -> &[f64] {
         &self.model.scale
+    }
+
+    fn parameter_scale(&self) -> &[f64] {
+        &self.parameter_scale
     }
 
     fn residual(&mut self, t: f64, y: &[f64], y_prime: &[f64], residual: &mut [f64]) {
