@@ -288,3 +288,25 @@ fn large_texts_are_read_in_proportional_time() {
         }
     }
 }
+
+/// The highlighting for editors knows every keyword of the grammar.
+#[test]
+fn highlighting_knows_every_keyword() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("grammar");
+    let highlighting = fs::read_to_string(root.join("ident.tmLanguage.json")).expect("highlighting");
+    let highlighting: serde_json::Value = serde_json::from_str(&highlighting).expect("JSON");
+    let patterns: String =
+        highlighting["patterns"].as_array().expect("patterns").iter().map(|p| p.to_string()).collect();
+    let grammar = fs::read_to_string(root.join("ident.pest")).expect("grammar");
+    let keywords = grammar.lines().filter_map(|line| {
+        let (rule, rest) = line.split_once("= @{ \"")?;
+        rule.trim().ends_with("_word").then(|| rest.split('"').next().unwrap_or_default())
+    });
+    let mut count = 0;
+    for keyword in keywords {
+        let known = [format!("|{keyword}|"), format!("({keyword}|"), format!("|{keyword})")];
+        assert!(known.iter().any(|form| patterns.contains(form.as_str())), "`{keyword}` is not highlighted");
+        count += 1;
+    }
+    assert!(count > 40, "only {count} keywords found in the grammar");
+}
