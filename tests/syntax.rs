@@ -68,7 +68,7 @@ fn errors_are_told_in_an_engineers_words() {
         let (tree, diagnostics) = parse(file, &text);
         let code = name.split('_').next().unwrap_or_default();
         assert!(diagnostics.iter().any(|finding| finding.code.text == code), "{name} does not show its code");
-        let kept: Vec<String> = tree.items.iter().map(|item| ident::syntax::print_item(item)).collect();
+        let kept: Vec<String> = tree.items.iter().map(ident::syntax::print_item).collect();
         let shown =
             format!("{}\n---- read nevertheless ----\n{}", render(&diagnostics, &sources, false), kept.concat());
         let mut settings = insta::Settings::clone_current();
@@ -84,9 +84,9 @@ fn errors_are_told_in_an_engineers_words() {
 fn examples_of_the_reference_are_read() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("grammar/README.md");
     let text = fs::read_to_string(path).expect("language reference");
-    let mut examples = text.split("```ident\n").skip(1);
+    let examples = text.split("```ident\n").skip(1);
     let mut count = 0;
-    for example in examples.by_ref() {
+    for example in examples {
         let (code, _) = example.split_once("```").expect("closed fence");
         assert!(!read_without_errors("grammar/README.md", code).items.is_empty(), "{code}");
         count += 1;
