@@ -124,9 +124,12 @@ pub struct Refit {
     pub bic_difference: f64,
     /// Likelihood-ratio p-value with effective sample size, family-wise over the screen.
     pub p_value: f64,
-    /// (name, value, interval low, interval high, unit)
-    pub parameters: Vec<(String, f64, Option<(f64, f64)>, String)>,
+    /// Strengths and shapes after the refit.
+    pub parameters: Vec<Strength>,
     pub plausible: bool,
     /// Why it was refused, if it was.
     pub objection: Option<String>,
 }
+
+/// A fitted strength or shape of an effect: (name, value, 95 % interval, unit).
+pub type Strength = (String, f64, Option<(f64, f64)>, String);

@@ -84,7 +84,7 @@ fn histories(answer: &Answer, record: &RecordFit, index: usize, width: f64) -> S
         let residual = |k: usize| channel.measured[k] - channel.simulated[k];
         strip.push(line(kept.clone().map(residual).collect(), style, ""));
     }
-    let x_axis = Axis::around(time, 0.0, (width / 90.0) as usize);
+    let x_axis = Axis::around(time, 0.0, (width / 70.0) as usize);
     let y_label = |quantity: &str| format!("{quantity} [{}]", measured.unit);
     let name = if measured.title.is_empty() { &measured.name } else { &measured.title };
     let plot = |marks, y_label, x_label: &str, height, legend| {

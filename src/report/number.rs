@@ -155,7 +155,7 @@ mod tests {
         assert_eq!(with_deviation(95.108_93, Some(0.12)), "95.11");
         assert_eq!(with_deviation(20_361.7, Some(35.0)), "20362");
         assert_eq!(with_deviation(3.0, Some(10.0)), "3.0");
-        assert_eq!(with_deviation(3.141_59, None), "3.142");
+        assert_eq!(with_deviation(5.432_19, None), "5.432");
     }
 
     #[test]

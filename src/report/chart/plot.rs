@@ -88,7 +88,9 @@ const RIGHT: f64 = 14.0;
 /// Points within a square of this many pixels are drawn as one, darker.
 const CLOUD_CELL: f64 = 2.0;
 /// Pixels between ticks that keep their labels apart.
-const TICK_SPACING: (f64, f64) = (90.0, 36.0);
+const TICK_SPACING: (f64, f64) = (75.0, 26.0);
+/// Average advance of the 12 px type of legends; width of a key; room between entries.
+const LEGEND: (f64, f64, f64) = (6.2, 22.0, 14.0);
 
 struct Frame {
     left: f64,
@@ -222,8 +224,13 @@ impl Plot<'_> {
     }
 
     fn draw_legend(&self, frame: &Frame, svg: &mut String) {
-        let mut at = frame.left + 4.0;
-        for mark in self.marks.iter().filter(|mark| !mark.name().is_empty()) {
+        let (advance, key, room) = LEGEND;
+        let length = |mark: &Mark| key + advance * mark.name().chars().count() as f64 + room;
+        let named = || self.marks.iter().filter(|mark| !mark.name().is_empty());
+        // A long legend begins further left rather than being cut on the right.
+        let total: f64 = named().map(length).sum();
+        let mut at = (frame.left + 4.0).min(self.width - total).max(2.0);
+        for mark in named() {
             let class = mark.style().class();
             match mark {
                 Mark::Line { .. } => {
@@ -238,9 +245,8 @@ impl Plot<'_> {
                     format_args!("<circle class=\"dot {class}\" cx=\"{}\" cy=\"14\" r=\"3.5\"/>", pixel(at + 9.0)),
                 ),
             }
-            push(svg, format_args!("<text x=\"{}\" y=\"18\">{}</text>", pixel(at + 23.0), escape(mark.name())));
-            // Average advance of the 12 px type used for legends.
-            at += 23.0 + 6.4 * mark.name().chars().count() as f64 + 20.0;
+            push(svg, format_args!("<text x=\"{}\" y=\"18\">{}</text>", pixel(at + key), escape(mark.name())));
+            at += length(mark);
         }
     }
 }

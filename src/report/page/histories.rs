@@ -60,7 +60,7 @@ pub fn views(curves: &[Curve]) -> Vec<RecordView> {
 
 fn channel_view(curves: &[Curve], record_index: usize, record: &RecordFit, index: usize) -> ChannelView {
     let channel = &record.channels[index];
-    let x_axis = Axis::around(&record.time, 0.0, (WIDTH / 90.0) as usize);
+    let x_axis = Axis::around(&record.time, 0.0, (WIDTH / 70.0) as usize);
     let plot = |marks, y_label, x_label: &str, height, legend| {
         let x_label = x_label.to_string();
         Plot { width: WIDTH, height, x_label, y_label, marks, legend, x_axis: x_axis.clone(), y_axis: None }.svg()

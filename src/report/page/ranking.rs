@@ -1,6 +1,6 @@
 //! The ranking of causes, one table per round of screening.
 
-use crate::diagnose::{Answer, Candidate, Refit, Step};
+use crate::diagnose::{Answer, Candidate, Refit, Step, Strength};
 use crate::report::chart::{Bar, Style, Whisker, bars, whisker};
 use crate::report::{number, words};
 use serde::Serialize;
@@ -104,7 +104,7 @@ fn row(step: &Step, place: usize, scale: (f64, f64)) -> Option<CandidateRow> {
 }
 
 fn strengths(refit: &Refit) -> Vec<String> {
-    let text = |(name, value, interval, unit): &(String, f64, Option<(f64, f64)>, String)| {
+    let text = |(name, value, interval, unit): &Strength| {
         let deviation = interval.map(|(low, high)| (high - low) / 3.92);
         let value = number::with_deviation(*value, deviation);
         format!("{name} = {value} {unit} ({})", number::interval_text(*interval))

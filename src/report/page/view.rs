@@ -205,10 +205,19 @@ fn discrepancy_figures(base: &Identification, extended: Option<&Identification>)
         base.estimation_discrepancy,
         extended.map(|fit| fit.estimation_discrepancy),
     );
-    let held_out = base.validation_discrepancy.map(|before| {
-        figure("Discrepancy, held-out data", before, extended.and_then(|fit| fit.validation_discrepancy))
-    });
-    [Some(estimation), held_out].into_iter().flatten().collect()
+    let held_out = match base.validation_discrepancy {
+        Some(before) => {
+            let after = extended.and_then(|fit| fit.validation_discrepancy);
+            figure("Discrepancy, held-out data", before, after)
+        }
+        None => KeyFigure {
+            label: "Discrepancy, held-out data".into(),
+            before: None,
+            value: "-".into(),
+            note: "the study has no validation record".into(),
+        },
+    };
+    vec![estimation, held_out]
 }
 
 fn work(fit: &Identification) -> WorkView {
