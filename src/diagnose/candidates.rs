@@ -41,8 +41,6 @@ pub(super) struct Unknown {
     pub upper: f64,
     pub neutral: f64,
     pub role: UnknownRole,
-    /// Typical size, used where no better start is known.
-    pub scale: f64,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -91,6 +89,12 @@ impl Candidate {
             .filter(|unknown| matches!(unknown.role, UnknownRole::Amplitude | UnknownRole::FiniteAmplitude(_)))
             .map(|unknown| (unknown.target.clone(), unknown.neutral))
             .collect()
+    }
+
+    /// Names of the shape parameters.
+    pub(super) fn shapes(&self) -> impl Iterator<Item = String> + '_ {
+        let is_shape = |unknown: &&Unknown| matches!(unknown.role, UnknownRole::Shape(_) | UnknownRole::Frequency);
+        self.unknowns.iter().filter(is_shape).map(|unknown| unknown.target.clone())
     }
 
     /// Values of all unknowns at which the candidate changes nothing, with shapes in the middle of their grids.
@@ -213,7 +217,6 @@ fn amplitude(element: &str, parameter: &EffectParameter, place: &Place, typical:
         upper,
         neutral: parameter.neutral,
         role,
-        scale: scale.unwrap_or((upper - lower) / 10.0),
     })
 }
 
@@ -236,7 +239,6 @@ fn shape(element: &str, parameter: &EffectParameter, place: &Place, typical: &Ty
     } else {
         UnknownRole::Shape(evenly_spaced(lower, upper, SHAPE_VALUES))
     };
-    let scale = scale.unwrap_or(upper - lower);
     Some(Unknown {
         target: format!("{element}_{}", parameter.name),
         dimension,
@@ -244,7 +246,6 @@ fn shape(element: &str, parameter: &EffectParameter, place: &Place, typical: &Ty
         upper,
         neutral: parameter.neutral,
         role,
-        scale,
     })
 }
 
@@ -265,7 +266,6 @@ fn freed_constant(study: &Study, constant: &crate::study::Constant) -> Option<Ca
             upper: ends[0].max(ends[1]),
             neutral: constant.value,
             role: UnknownRole::Amplitude,
-            scale: constant.value.abs(),
         }],
         change: String::new(),
     })

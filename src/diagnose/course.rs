@@ -24,6 +24,10 @@ pub(super) struct Course {
     pub below_visibility: bool,
     /// Whether any accepted candidate belongs to the catalogue's shapes without a name.
     pub unnamed: bool,
+    /// The search ended because enough extensions were accepted, not because nothing further was found.
+    pub limit_reached: bool,
+    /// Shape parameters of accepted effects.
+    shapes: Vec<String>,
     cannot_judge: Vec<String>,
 }
 
@@ -53,6 +57,9 @@ impl Course {
         }
         let accepted =
             chosen.and_then(|position| order.iter().position(|&index| index == judged[position].refitted.candidate));
+        if let Some(position) = chosen {
+            self.shapes.extend(candidates[judged[position].refitted.candidate].shapes());
+        }
         let judgement = judgement(judged, chosen, candidates, self.below_visibility);
         reported.truncate(SHOWN);
         self.steps.push(Step {
@@ -78,6 +85,14 @@ impl Course {
         let simulations = self.simulations + base.simulations + extended.simulations;
         let mut remarks = base.remarks.clone();
         remarks.extend(extended.remarks.iter().filter(|remark| !base.remarks.contains(remark)).cloned());
+        // A shape at the end of its grid range (a creep velocity too small to be resolved) is no structural error.
+        remarks.retain(|remark| !self.shapes.iter().any(|shape| remark.starts_with(&format!("{shape} is at its bound"))));
+        if self.limit_reached {
+            remarks.push(format!(
+                "stopped after {} extensions as asked; `--extensions N` goes on",
+                self.accepted()
+            ));
+        }
         Answer {
             study: compiled.study.name.clone(),
             title: compiled.study.title.clone(),

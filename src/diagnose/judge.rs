@@ -38,8 +38,6 @@ pub(super) struct Judged {
     pub refitted: Refitted,
     pub bic: f64,
     pub report: Refit,
-    /// Held-out residual, for comparisons between candidates.
-    pub held_out: Option<Vec<f64>>,
     /// Largest change of a simulated channel, as a share of the channel's deviation.
     pub visible_change: f64,
 }
@@ -161,7 +159,7 @@ fn judge_one(
         objection,
     };
     let visible_change = visible_change(round, &refitted);
-    Judged { refitted, bic, report, held_out: held_out_residual, visible_change }
+    Judged { refitted, bic, report, visible_change }
 }
 
 /// How far the extension moves the simulated channels, relative to the channels' deviation.

@@ -102,6 +102,7 @@ pub fn diagnose(
             Some(next) => model = next,
             None => break,
         }
+        course.limit_reached = course.accepted() == options.maximum_extensions;
     }
     let source = missing_force::Source {
         compiled: &model.compiled,

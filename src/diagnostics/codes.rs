@@ -292,6 +292,10 @@ codes! {
 
     // ---- E06xx: fit and diagnosis ----
 
+    NO_INFLUENCE "E0602" "parameter without influence"
+    "No path leads from the parameter to any measured channel, so that no data can determine it. Measure something that\n\
+     depends on it, or hold it fixed.\n"
+
     FIT_FAILED "E0601" "fit cannot begin"
     "The model cannot be simulated at the start values of the parameters, or the bounds contradict each other. The message\n\
      names the first simulation that failed.\n"

@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::prepare::Record;
-use crate::diagnostics::Diagnostic;
+use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::Symbol;
 use crate::integrate::{self, Dynamics, MethodChoice, Options, Solution, Start, Work};
 use crate::mechanics::{self, System};
@@ -23,7 +23,8 @@ impl Compiled {
     pub fn new(study: Study) -> Result<Self, Vec<Diagnostic>> {
         let system = mechanics::derive(&study)?;
         let model = Model::compile(&system);
-        Ok(Self { study, system, model })
+        let idle = parameters_without_influence(&study, &model);
+        if idle.is_empty() { Ok(Self { study, system, model }) } else { Err(idle) }
     }
 
     /// As [`Compiled::new`], with the named parameters held at these values (SI): they become constants of the equations.
@@ -45,6 +46,21 @@ impl Compiled {
         let model = Model::compile(&system);
         Ok(Self { study, system, model })
     }
+}
+
+/// A parameter from which no path leads to any measured channel cannot be identified by any data.
+fn parameters_without_influence(study: &Study, model: &Model) -> Vec<Diagnostic> {
+    study
+        .parameters
+        .iter()
+        .zip(model.parameter_reach())
+        .filter(|(_, reach)| !reach.contains(&true))
+        .map(|(parameter, _)| {
+            Diagnostic::error(Code::NO_INFLUENCE, format!("parameter `{}` has no influence on any measure", parameter.name))
+                .label(parameter.span, "nothing that is measured depends on it")
+                .help("measure a quantity that depends on it, or take it out of `identify` and give its value in the study")
+        })
+        .collect()
 }
 
 /// Whether the gradient is wanted.
