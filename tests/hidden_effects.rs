@@ -4,7 +4,11 @@ mod support;
 mod truth;
 
 use Strength::{Medium, Strong, Weak};
+use ident::diagnose::{Options, diagnose};
+use ident::diagnostics::{Diagnostic, render};
+use ident::study::check;
 use rayon::prelude::*;
+use support::judge::Outcome;
 use support::{Case, Strength};
 
 const CASES: [Case; 38] = [
@@ -56,17 +60,62 @@ const fn nothing(study: &'static str, seed: u64) -> Case {
     Case { study, hidden: None, strength: Weak, seed }
 }
 
-/// The class of each case is measured, not claimed.
+/// Diagnoses the cases and prints a line for each.
+fn outcomes(selected: impl Fn(&Case) -> bool) -> Vec<Outcome> {
+    let cases: Vec<Case> = CASES.into_iter().filter(selected).collect();
+    let outcomes: Vec<Outcome> = cases.par_iter().map(diagnosed).collect();
+    for outcome in &outcomes {
+        println!("{outcome}");
+    }
+    outcomes
+}
+
+fn diagnosed(case: &Case) -> Outcome {
+    let prepared = case.prepare();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = prepared.write(folder.path()).expect("the case is written");
+    let loaded = ident::study::load(&file);
+    let shown = |findings: &[Diagnostic]| render(findings, &loaded.sources, false);
+    let checked = check(&loaded, None).unwrap_or_else(|findings| panic!("{}: {}", case.title(), shown(&findings)));
+    let (records, findings) = ident::simulation::prepare(&checked.study, folder.path(), &[]);
+    assert!(!findings.iter().any(Diagnostic::is_error), "{}: {}", case.title(), shown(&findings));
+    let answer = diagnose(&loaded, &records, &Options::default(), &|_| {})
+        .unwrap_or_else(|findings| panic!("{}: {}", case.title(), shown(&findings)));
+    Outcome::judge(&prepared, &answer)
+}
+
+/// Requirements on the cases of one study: strong and medium causes are named at the right place or stand in the stated
+/// group, and the extension then gains on the held-out record at least nine tenths of what the truth gains.
+fn causes_are_found_in(study: &str) {
+    let outcomes = outcomes(|case| case.study == study && case.hidden.is_some());
+    let failures: Vec<String> = outcomes.iter().filter_map(Outcome::failure).collect();
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
 #[test]
-fn every_effect_is_as_strong_as_its_class_says() {
-    let wrong: Vec<String> = CASES
-        .par_iter()
-        .filter(|case| case.hidden.is_some())
-        .map(Case::prepare)
-        .filter(|prepared| !prepared.case.strength.contains(prepared.measured_strength))
-        .map(|prepared| {
-            format!("{}: changes {:.4}, {:?}", prepared.case.title(), prepared.measured_strength, prepared.effect)
-        })
-        .collect();
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+fn causes_are_found_in_the_quarter_vehicle() {
+    causes_are_found_in("quarter_vehicle");
+}
+
+#[test]
+fn causes_are_found_in_the_two_mass_drive() {
+    causes_are_found_in("two_mass");
+}
+
+#[test]
+fn causes_are_found_in_the_crane() {
+    causes_are_found_in("crane_pendulum");
+}
+
+#[test]
+fn causes_are_found_in_the_spring_slide() {
+    causes_are_found_in("spring_slide");
+}
+
+#[test]
+fn nothing_is_invented_where_nothing_is_hidden() {
+    let outcomes = outcomes(|case| case.hidden.is_none());
+    let alarms: Vec<String> =
+        outcomes.iter().filter(|outcome| outcome.raised_alarm()).map(ToString::to_string).collect();
+    assert!(alarms.len() <= 1, "\n{}", alarms.join("\n"));
 }

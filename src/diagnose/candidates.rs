@@ -7,15 +7,17 @@ use crate::study::{EffectDeclaration, EffectParameter, ForcePlace, Place, PlaceK
 use std::fmt::Write;
 
 /// Amplitudes of effects that declare no range may grow to this multiple of their natural scale.
-const AMPLITUDE_REACH: f64 = 20.0;
+const AMPLITUDE_REACH: f64 = 1000.0;
 /// Significant digits of numbers in generated text.
 const DIGITS: usize = 6;
 /// A number held fixed may be off by this factor either way.
 const CONSTANT_REACH: f64 = 4.0;
 /// Finite strengths tried for effects without a derivative at their neutral value, log-spaced over the range.
-const FINITE_STRENGTHS: usize = 5;
+const FINITE_STRENGTHS: usize = 8;
+/// Range of finite strengths, relative to the natural scale, where the effect declares none.
+const FINITE_RANGE: (f64, f64) = (0.05, 5.0);
 /// Values tried for a shape parameter, log-spaced over its range.
-const SHAPE_VALUES: usize = 3;
+const SHAPE_VALUES: usize = 5;
 
 /// Something that may be missing in the model.
 #[derive(Clone, Debug)]
@@ -27,6 +29,8 @@ pub(super) struct Candidate {
     pub title: String,
     /// Parameters the candidate adds, in the order of its `identify` lines.
     pub unknowns: Vec<Unknown>,
+    /// Elements at which the same effect would be the very same force.
+    pub aliases: Vec<String>,
     /// How the change reads in a variant, without the `identify` block; empty for a freed constant.
     pub change: String,
 }
@@ -130,6 +134,19 @@ fn fits(effect: &EffectDeclaration, place: &Place) -> bool {
         && effect.dimension.is_none_or(|dimension| dimension == place.dimension)
 }
 
+/// Names of the candidates that [`stands_at_joint`] leaves out in favour of this one.
+fn aliases(study: &Study, effect: &EffectDeclaration, place: &Place) -> Vec<String> {
+    if place.kind != PlaceKind::Joint {
+        return Vec::new();
+    }
+    let joint = study.joints.iter().position(|joint| joint.name == place.name);
+    let same = |force: &&crate::study::Force| matches!((force.place, joint), (ForcePlace::Joint(a), Some(b)) if a == b);
+    let fitting = |force: &&crate::study::Force| {
+        study.places.iter().any(|other| other.name == force.name && fits(effect, other))
+    };
+    study.forces.iter().filter(same).filter(fitting).map(|force| format!("{} at {}", effect.name, force.name)).collect()
+}
+
 /// What an effect adds at a force element on a joint it adds at the joint itself; effects known at both are tried once.
 fn stands_at_joint(study: &Study, effect: &EffectDeclaration, place: &Place) -> bool {
     let on_joint =
@@ -158,6 +175,7 @@ fn effect_candidate(study: &Study, effect: &EffectDeclaration, place: &Place, ty
         effect: effect.name.clone(),
         place: place.name.clone(),
         title: effect.title.clone(),
+        aliases: aliases(study, effect, place),
         unknowns,
         change: format!("effect {element}: {} on {} {{ {} }}", effect.name, place.name, fields.join(", ")),
     })
@@ -205,8 +223,12 @@ fn amplitude(element: &str, parameter: &EffectParameter, place: &Place, typical:
         lower = lower.max(parameter.neutral);
     }
     let role = if parameter.finite_only {
-        let positive = log_spaced(lower.max(upper * 1e-3), upper, FINITE_STRENGTHS);
-        UnknownRole::FiniteAmplitude(positive)
+        let declared = parameter.range.or(relative);
+        let (from, to) = match (declared, scale) {
+            (None, Some(scale)) => (FINITE_RANGE.0 * scale, FINITE_RANGE.1 * scale),
+            _ => (lower.max(upper * 1e-3), upper),
+        };
+        UnknownRole::FiniteAmplitude(log_spaced(from, to, FINITE_STRENGTHS))
     } else {
         UnknownRole::Amplitude
     };
@@ -258,6 +280,7 @@ fn freed_constant(study: &Study, constant: &crate::study::Constant) -> Option<Ca
         name: format!("{} set free", constant.path),
         effect: "constant".to_owned(),
         place: constant.path.clone(),
+        aliases: Vec::new(),
         title: format!("The value {} of {} is not right", constant.unit.format(constant.value, DIGITS), constant.path),
         unknowns: vec![Unknown {
             target: constant.path.clone(),

@@ -26,6 +26,8 @@ pub(super) struct Course {
     pub unnamed: bool,
     /// The search ended because enough extensions were accepted, not because nothing further was found.
     pub limit_reached: bool,
+    /// An accepted cause has rivals besides other names of the same force.
+    ambiguous: bool,
     /// Shape parameters of accepted effects.
     shapes: Vec<String>,
     cannot_judge: Vec<String>,
@@ -58,6 +60,8 @@ impl Course {
         let accepted =
             chosen.and_then(|position| order.iter().position(|&index| index == judged[position].refitted.candidate));
         if let Some(position) = chosen {
+            let aliases = &candidates[judged[position].refitted.candidate].aliases;
+            self.ambiguous |= indistinguishable.len() > 1 + aliases.len();
             self.shapes.extend(candidates[judged[position].refitted.candidate].shapes());
         }
         let judgement = judgement(judged, chosen, candidates, self.below_visibility);
@@ -121,8 +125,7 @@ impl Course {
         if self.unnamed {
             return Verdict::ShapeWithoutName;
         }
-        let ambiguous = self.steps.iter().any(|step| step.accepted.is_some() && step.indistinguishable.len() > 1);
-        if ambiguous { Verdict::GroupOfCauses } else { Verdict::CauseNamed }
+        if self.ambiguous { Verdict::GroupOfCauses } else { Verdict::CauseNamed }
     }
 
     fn summary(&self, verdict: &Verdict, base: &Identification, extended: &Identification) -> String {

@@ -15,6 +15,8 @@ const MINIMUM_HELD_OUT_GAIN: f64 = 1.0;
 const MINIMUM_BIC_GAIN: f64 = 10.0;
 /// Refits whose criterion differs by less than this cannot be told apart (Kass-Raftery-1995).
 const INDISTINGUISHABLE_BIC: f64 = 6.0;
+/// Refits closer than this are the same but for rounding.
+const EQUIVALENT_BIC: f64 = 0.1;
 /// Family-wise level of a screen.
 const LEVEL: f64 = 0.05;
 /// An extension that changes no channel by more than this share of its deviation is below what sensors and simulation
@@ -122,7 +124,10 @@ pub(super) fn judge(
             judge_one(round, candidate, refitted, held_out, &effective, base_bic, candidates.len())
         })
         .collect();
-    judged.sort_by(|a, b| a.bic.total_cmp(&b.bic));
+    // Equivalent candidates (one effect at two elements between the same bodies) differ by rounding only: the order of the
+    // catalogue decides then.
+    let key = |entry: &Judged| ((entry.bic / EQUIVALENT_BIC).round(), entry.refitted.candidate);
+    judged.sort_by(|a, b| key(a).0.total_cmp(&key(b).0).then(key(a).1.cmp(&key(b).1)));
     judged
 }
 
@@ -237,6 +242,7 @@ fn objection(
 pub(super) fn indistinguishable(judged: &[Judged], chosen: usize, candidates: &[Candidate]) -> Vec<String> {
     let name = |entry: &Judged| candidates[entry.refitted.candidate].name.clone();
     let mut group = vec![name(&judged[chosen])];
+    group.extend(candidates[judged[chosen].refitted.candidate].aliases.iter().cloned());
     for (position, entry) in judged.iter().enumerate() {
         let close = (entry.bic - judged[chosen].bic).abs() < INDISTINGUISHABLE_BIC;
         if position != chosen && close && entry.accepted() {
@@ -246,10 +252,10 @@ pub(super) fn indistinguishable(judged: &[Judged], chosen: usize, candidates: &[
     group
 }
 
-/// True where even the best candidate moves the measured channels by less than can be trusted.
-pub(super) fn below_visibility(round: &Round, judged: &[Judged]) -> bool {
+/// True where the candidate would be accepted but moves the measured channels by less than can be trusted.
+pub(super) fn below_visibility(round: &Round, chosen: &Judged) -> bool {
     let stated = round.compiled.study.measures.iter().any(|measure| measure.noise.is_some());
-    !stated && judged.first().is_some_and(|best| best.visible_change < MINIMUM_VISIBLE_CHANGE)
+    !stated && chosen.visible_change < MINIMUM_VISIBLE_CHANGE
 }
 
 /// The judged refits as entries of the reported ranking.

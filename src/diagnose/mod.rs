@@ -148,12 +148,11 @@ fn extend(
     let judged = judge::judge(&round, &candidates, refits, held_out.as_ref());
     course.simulations += screened.iter().flatten().map(|entry| entry.simulations).sum::<usize>();
     course.simulations += judged.iter().map(|entry| entry.refitted.fitted.simulations).sum::<usize>();
-    let chosen = if judge::below_visibility(&round, &judged) {
+    let mut chosen = judged.iter().position(Judged::accepted);
+    if chosen.is_some_and(|position| judge::below_visibility(&round, &judged[position])) {
         course.below_visibility = course.accepted() == 0;
-        None
-    } else {
-        judged.iter().position(Judged::accepted)
-    };
+        chosen = None;
+    }
     course.record(&round, &candidates, &screened, &judged, chosen);
     let Some(chosen) = chosen else {
         return Ok(None);

@@ -12,7 +12,7 @@ use crate::identify::Problem;
 use crate::linear::least_squares;
 
 /// Multiples of the strength estimated at zero that are tried.
-const STRENGTH_FACTORS: [f64; 3] = [0.5, 1.0, 2.0];
+const STRENGTH_FACTORS: [f64; 4] = [0.5, 1.0, 2.5, 8.0];
 
 /// What the screen found for one candidate.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use super::checker::{Checker, Entity, Site};
 use super::kinds::load_dimension;
-use super::model::{Force, ForcePlace, JointKind, Measure, Place, PlaceKind, PlaceQuantity};
+use super::model::{Force, ForcePlace, JointKind, JointSymbols, Measure, Place, PlaceKind, PlaceQuantity};
 use crate::expression::Node;
 use crate::quantities::Dimension;
 
@@ -41,10 +41,24 @@ impl<'a> Checker<'a> {
         let position = self.graph.variable(symbols.position);
         let velocity = self.graph.variable(symbols.velocity);
         let mut probes = vec![(PlaceQuantity::Coordinate, position), (PlaceQuantity::Rate, velocity)];
-        probes.extend(self.joint_load(joint, forces).map(|load| (PlaceQuantity::Load, load)));
+        let load = self.joint_load(joint, forces);
+        probes.push((PlaceQuantity::Load, self.load_magnitude(symbols, load)));
         let name = self.declared.joints[joint].name.text.clone();
         let dimension = load_dimension(motion);
         Some(Place { kind: PlaceKind::Joint, name, motion: Some(motion), dimension, probes })
+    }
+
+    /// Size of what acts on a joint: its elements' loads and the load that accelerates what it moves, as root of the sum of
+    /// squares. A free joint without any element has the second only.
+    fn load_magnitude(&mut self, symbols: JointSymbols, load: Option<Node>) -> Node {
+        let inertia = self.graph.variable(symbols.inertia);
+        let acceleration = self.graph.variable(symbols.acceleration);
+        let inertial = self.graph.multiply(inertia, acceleration);
+        let inertial_square = self.graph.multiply(inertial, inertial);
+        let load = load.unwrap_or_else(|| self.graph.constant(0.0));
+        let load_square = self.graph.multiply(load, load);
+        let sum = self.graph.add(inertial_square, load_square);
+        self.graph.unary(crate::expression::Unary::Sqrt, sum)
     }
 
     /// Sum of the loads in the joint's direction; `None` where no element can be projected on it.

@@ -1,14 +1,19 @@
 //! An answer held against the truth.
 
-use super::Prepared;
+use super::{Prepared, Strength};
 use crate::truth::record::Record;
 use ident::diagnose::{Answer, Verdict};
 use ident::identify::{Identification, RecordFit};
+use std::fmt::{Display, Formatter};
+
+/// Share of the truth's held-out gain that an extension must reach.
+const REQUIRED_SHARE: f64 = 0.9;
 
 /// A case's answer in the few figures that the requirements speak of.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     pub title: String,
+    strength: Option<(Strength, f64)>,
     pub verdict: Verdict,
     /// Causes accepted, in order.
     pub accepted: Vec<String>,
@@ -41,6 +46,7 @@ impl Outcome {
         let floor = prepared.validation.noise_floor().sqrt();
         Self {
             title: prepared.case.title(),
+            strength: prepared.case.hidden.map(|_| (prepared.case.strength, prepared.measured_strength)),
             verdict: answer.verdict.clone(),
             accepted,
             group,
@@ -51,9 +57,36 @@ impl Outcome {
         }
     }
 
-    /// Whether something was named where something should be.
+    /// Whether something was named.
     pub fn raised_alarm(&self) -> bool {
         self.verdict != Verdict::NothingWrongFound
+    }
+
+    /// What the requirements on a hidden cause miss, if anything.
+    pub fn failure(&self) -> Option<String> {
+        let (class, measured) = self.strength?;
+        if !class.contains(measured) {
+            return Some(format!("{}: changes the outputs by {measured:.4}, not of its class", self.title));
+        }
+        if class == Strength::Weak {
+            return None;
+        }
+        if !self.cause_found {
+            return Some(format!("cause not found: {self}"));
+        }
+        (self.gain < REQUIRED_SHARE * self.true_gain).then(|| format!("gain too small: {self}"))
+    }
+}
+
+impl Display for Outcome {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let found = if self.cause_found { "found" } else { "-" };
+        write!(f, "{:<68} {found:<6} {:?} [{}]", self.title, self.verdict, self.accepted.join(", "))?;
+        if self.group.len() > 1 {
+            write!(f, " group of {}: {}", self.group.len(), self.group.join(", "))?;
+        }
+        let (gain, truth) = (100.0 * self.gain, 100.0 * self.true_gain);
+        write!(f, ", held-out error -{gain:.1} % of -{truth:.1} %, {} simulations", self.simulations)
     }
 }
 
