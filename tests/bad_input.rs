@@ -166,7 +166,11 @@ fn constant_channel() {
         .iter()
         .enumerate()
         .map(|(k, line)| {
-            if k == 0 { line.clone() } else { line.rsplit_once(',').map(|(head, _)| format!("{head},3.5")).unwrap_or_default() }
+            if k == 0 {
+                line.clone()
+            } else {
+                line.rsplit_once(',').map(|(head, _)| format!("{head},3.5")).unwrap_or_default()
+            }
         })
         .collect();
     assert_names(&Place::new(STUDY, &lines).refuse(), &["shaking.csv", "position", "3.5"]);

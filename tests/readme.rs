@@ -100,7 +100,9 @@ fn keys(text: &str) -> BTreeSet<String> {
             let (Some(year), authors) = (parts.last(), &parts[..parts.len() - 1]) else { return false };
             let is_year = year.len() == 4 && year.starts_with(['1', '2']) && year.bytes().all(|b| b.is_ascii_digit());
             let is_name = |part: &&str| {
-                part.len() > 2 && part.starts_with(|c: char| c.is_ascii_uppercase()) && part.chars().all(char::is_alphabetic)
+                part.len() > 2
+                    && part.starts_with(|c: char| c.is_ascii_uppercase())
+                    && part.chars().all(char::is_alphabetic)
             };
             is_year && !authors.is_empty() && authors.iter().all(|part| is_name(part))
         })

@@ -141,9 +141,8 @@ fn aliases(study: &Study, effect: &EffectDeclaration, place: &Place) -> Vec<Stri
     }
     let joint = study.joints.iter().position(|joint| joint.name == place.name);
     let same = |force: &&crate::study::Force| matches!((force.place, joint), (ForcePlace::Joint(a), Some(b)) if a == b);
-    let fitting = |force: &&crate::study::Force| {
-        study.places.iter().any(|other| other.name == force.name && fits(effect, other))
-    };
+    let fitting =
+        |force: &&crate::study::Force| study.places.iter().any(|other| other.name == force.name && fits(effect, other));
     study.forces.iter().filter(same).filter(fitting).map(|force| format!("{} at {}", effect.name, force.name)).collect()
 }
 

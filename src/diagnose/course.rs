@@ -90,12 +90,10 @@ impl Course {
         let mut remarks = base.remarks.clone();
         remarks.extend(extended.remarks.iter().filter(|remark| !base.remarks.contains(remark)).cloned());
         // A shape at the end of its grid range (a creep velocity too small to be resolved) is no structural error.
-        remarks.retain(|remark| !self.shapes.iter().any(|shape| remark.starts_with(&format!("{shape} is at its bound"))));
+        remarks
+            .retain(|remark| !self.shapes.iter().any(|shape| remark.starts_with(&format!("{shape} is at its bound"))));
         if self.limit_reached {
-            remarks.push(format!(
-                "stopped after {} extensions as asked; `--extensions N` goes on",
-                self.accepted()
-            ));
+            remarks.push(format!("stopped after {} extensions as asked; `--extensions N` goes on", self.accepted()));
         }
         Answer {
             study: compiled.study.name.clone(),

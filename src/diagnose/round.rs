@@ -9,6 +9,8 @@ use crate::study::{self, Loaded};
 
 /// Name under which a trial variant is appended to the study; never shown.
 const TRIAL: &str = "candidate_trial";
+/// A screen looks for shares of the residual, which is far above this tolerance; refits use the study's own.
+const SCREENING_TOLERANCE: f64 = 1e-4;
 /// Peaks of the residual's spectrum at which an unknown frequency is tried.
 const PEAKS: usize = 4;
 /// Chi-square distance at which a strength counts as detectable: 5 % over some hundred candidates.
@@ -53,10 +55,11 @@ impl<'a> Round<'a> {
     pub(super) fn compile(&self, candidate: &Candidate, values: &[f64], frozen: bool) -> Option<Compiled> {
         let text = candidate.variant(TRIAL, self.variant, values);
         let extended = self.loaded.with_text(&text);
-        let study = study::check(&extended, Some(TRIAL)).ok()?.study;
+        let mut study = study::check(&extended, Some(TRIAL)).ok()?.study;
         if !frozen {
             return Compiled::new(study).ok();
         }
+        study.solver.relative_tolerance = study.solver.relative_tolerance.max(SCREENING_TOLERANCE);
         let current = &self.compiled.study.parameters;
         let fixed: Vec<(String, f64)> =
             current.iter().map(|parameter| parameter.name.clone()).zip(self.fitted.theta.iter().copied()).collect();

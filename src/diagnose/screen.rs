@@ -14,6 +14,12 @@ use crate::linear::least_squares;
 /// Multiples of the strength estimated at zero that are tried.
 const STRENGTH_FACTORS: [f64; 4] = [0.5, 1.0, 2.5, 8.0];
 
+/// Shapes at which finite strengths are tried, those with the best score.
+const SHAPES_TRIED: usize = 2;
+
+/// Estimated strengths: (index of the unknown, difference from its neutral value).
+type Strengths = Vec<(usize, f64)>;
+
 /// What the screen found for one candidate.
 #[derive(Clone, Debug)]
 pub(super) struct Screened {
@@ -42,14 +48,12 @@ pub(super) fn screen(round: &Round, candidate: &Candidate) -> Option<Screened> {
         smallest_detectable: None,
         simulations: 0,
     };
-    for shapes in shape_grid(round, candidate) {
-        for values in trial.strengths(&shapes, &mut best) {
-            if let Some(deviance) = trial.projected_deviance(&values)
-                && deviance < best.deviance
-            {
-                best.deviance = deviance;
-                best.values = values;
-            }
+    for values in trial.points(&mut best) {
+        if let Some(deviance) = trial.projected_deviance(&values)
+            && deviance < best.deviance
+        {
+            best.deviance = deviance;
+            best.values = values;
         }
     }
     best.simulations = trial.problem.simulations;
@@ -93,23 +97,40 @@ impl Trial<'_> {
         Some(self.round.deviance(&residual))
     }
 
-    /// Points to try for one combination of shapes; notes the score on the way.
-    fn strengths(&mut self, shapes: &[f64], best: &mut Screened) -> Vec<Vec<f64>> {
+    /// Points to try: all finite strengths at all shapes, or multiples of the strength estimated at zero at the shapes whose
+    /// score is best. Notes the score on the way.
+    fn points(&mut self, best: &mut Screened) -> Vec<Vec<f64>> {
+        let grid = shape_grid(self.round, self.candidate);
         let finite = self.candidate.unknowns.iter().position(|u| matches!(u.role, UnknownRole::FiniteAmplitude(_)));
         if let Some(position) = finite {
             let UnknownRole::FiniteAmplitude(values) = &self.candidate.unknowns[position].role else {
                 return Vec::new();
             };
-            return values.iter().map(|&value| with(shapes, position, value)).collect();
+            return grid
+                .iter()
+                .flat_map(|shapes| values.iter().map(move |&value| with(shapes, position, value)))
+                .collect();
         }
-        let Some(estimate) = self.score(shapes, best) else {
-            return Vec::new();
-        };
-        STRENGTH_FACTORS.iter().map(|factor| self.scaled(shapes, &estimate, *factor)).collect()
+        let mut scores: Vec<(f64, Vec<f64>, Strengths)> = grid
+            .into_iter()
+            .filter_map(|shapes| {
+                let (statistic, estimate) = self.score(&shapes, best)?;
+                Some((statistic, shapes, estimate))
+            })
+            .collect();
+        scores.sort_by(|a, b| b.0.total_cmp(&a.0));
+        scores.truncate(SHAPES_TRIED);
+        scores
+            .iter()
+            .flat_map(|(_, shapes, estimate)| {
+                STRENGTH_FACTORS.iter().map(|factor| self.scaled(shapes, estimate, *factor)).collect::<Vec<_>>()
+            })
+            .collect()
     }
 
-    /// Linear estimate of the strengths at their neutral values; `None` where all have the wrong sign or no influence.
-    fn score(&mut self, shapes: &[f64], best: &mut Screened) -> Option<Vec<(usize, f64)>> {
+    /// Score statistic and linear estimate of the strengths at their neutral values; `None` where all have the wrong sign or
+    /// no influence.
+    fn score(&mut self, shapes: &[f64], best: &mut Screened) -> Option<(f64, Strengths)> {
         let amplitudes: Vec<usize> = (0..self.candidate.unknowns.len())
             .filter(|&i| self.candidate.unknowns[i].role == UnknownRole::Amplitude)
             .collect();
@@ -144,7 +165,7 @@ impl Trial<'_> {
         if estimate.iter().all(|value| *value == 0.0) {
             return None;
         }
-        Some(amplitudes.into_iter().zip(estimate).collect())
+        Some((statistic, amplitudes.into_iter().zip(estimate).collect()))
     }
 
     fn scaled(&self, shapes: &[f64], estimate: &[(usize, f64)], factor: f64) -> Vec<f64> {

@@ -56,9 +56,12 @@ fn parameters_without_influence(study: &Study, model: &Model) -> Vec<Diagnostic>
         .zip(model.parameter_reach())
         .filter(|(_, reach)| !reach.contains(&true))
         .map(|(parameter, _)| {
-            Diagnostic::error(Code::NO_INFLUENCE, format!("parameter `{}` has no influence on any measure", parameter.name))
-                .label(parameter.span, "nothing that is measured depends on it")
-                .help("measure a quantity that depends on it, or take it out of `identify` and give its value in the study")
+            Diagnostic::error(
+                Code::NO_INFLUENCE,
+                format!("parameter `{}` has no influence on any measure", parameter.name),
+            )
+            .label(parameter.span, "nothing that is measured depends on it")
+            .help("measure a quantity that depends on it, or take it out of `identify` and give its value in the study")
         })
         .collect()
 }
