@@ -61,3 +61,80 @@ fn inside(point: &[f64], start: &[f64], bounds: &Bounds) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::{EvaluationFailure, GaussianPrior, WithPriors};
+
+    /// One slice per start on every axis, and the same points again.
+    #[test]
+    fn the_hypercube_fills_every_slice() {
+        let points = latin_hypercube(16, 3, 42);
+        for axis in 0..3 {
+            let mut slices: Vec<usize> = points.iter().map(|point| (point[axis] * 16.0) as usize).collect();
+            slices.sort_unstable();
+            assert_eq!(slices, (0..16).collect::<Vec<_>>());
+        }
+        assert_eq!(points, latin_hypercube(16, 3, 42));
+        assert_ne!(points, latin_hypercube(16, 3, 43));
+    }
+
+    /// Measurements of sin(w t): a frequency has many local minima.
+    struct Frequency;
+
+    impl LeastSquares for Frequency {
+        fn residual(&mut self, theta: &[f64]) -> Result<Vec<f64>, EvaluationFailure> {
+            Ok(self.residual_and_gradient(theta)?.0)
+        }
+
+        fn residual_and_gradient(&mut self, theta: &[f64]) -> Result<(Vec<f64>, Vec<f64>), EvaluationFailure> {
+            if theta[0] > 26.0 {
+                return Err(EvaluationFailure { explanation: "too fast".to_owned() });
+            }
+            let times = (0..60).map(|k| 0.02 * f64::from(k));
+            Ok(times.map(|t| ((theta[0] * t).sin() - (17.0 * t).sin(), t * (theta[0] * t).cos())).unzip())
+        }
+    }
+
+    #[test]
+    fn many_starts_find_the_global_minimum() {
+        let bounds = Bounds::new(vec![1.0], vec![30.0]);
+        let mut quiet = |_: &Progress| Control::Continue;
+        let alone = levenberg_marquardt(&mut Frequency, &[4.0], &bounds, &Options::default(), &mut quiet).unwrap();
+        assert!((alone.theta[0] - 17.0).abs() > 1.0, "{:?}", alone.theta);
+        let all = multi_start(&mut Frequency, &[4.0], &bounds, &Options::default(), 12, 1, &mut quiet).unwrap();
+        assert!((all[0].theta[0] - 17.0).abs() < 1e-4, "{:?}", all[0].theta);
+        assert!(all.len() < 13, "a start that cannot be evaluated is left out");
+        assert!(all.windows(2).all(|pair| pair[0].cost <= pair[1].cost));
+    }
+
+    /// y = theta with variance 1 and a prior 3 +- 0.5: the posterior mean is (y + 4 * 3) / 5.
+    #[test]
+    fn priors_are_weighted_rows() {
+        struct One;
+        impl LeastSquares for One {
+            fn residual(&mut self, theta: &[f64]) -> Result<Vec<f64>, EvaluationFailure> {
+                Ok(vec![theta[0] - 1.0])
+            }
+            fn residual_and_gradient(&mut self, theta: &[f64]) -> Result<(Vec<f64>, Vec<f64>), EvaluationFailure> {
+                Ok((vec![theta[0] - 1.0], vec![1.0, 0.0]))
+            }
+        }
+        let priors = [
+            GaussianPrior { parameter: 0, mean: 3.0, standard_deviation: 0.5 },
+            GaussianPrior { parameter: 1, mean: 7.0, standard_deviation: 2.0 },
+        ];
+        let mut problem = WithPriors { problem: &mut One, priors: &priors };
+        let mut quiet = |_: &Progress| Control::Continue;
+        let bounds = Bounds::none(2);
+        let estimate =
+            levenberg_marquardt(&mut problem, &[0.0, 0.0], &bounds, &Options::default(), &mut quiet).unwrap();
+        assert!(
+            (estimate.theta[0] - 13.0 / 5.0).abs() < 1e-7 && (estimate.theta[1] - 7.0).abs() < 1e-6,
+            "{:?}",
+            estimate.theta
+        );
+        assert_eq!(estimate.gradient, [1.0, 2.0, 0.0, 0.0, 0.0, 0.5]);
+    }
+}

@@ -1,5 +1,6 @@
 //! Design of Butterworth low-pass filters from edges and attenuations.
 
+use crate::diagnostics::{Code, Diagnostic, Span};
 use std::fmt;
 
 /// Steeper transitions than this order can give are refused: the filter would ring longer than any record.
@@ -74,6 +75,22 @@ impl fmt::Display for FilterError {
 }
 
 impl std::error::Error for FilterError {}
+
+impl FilterError {
+    /// As a finding of the study at its `filter`.
+    pub fn diagnostic(&self, place: Span) -> Diagnostic {
+        let help = match self {
+            Self::Contradictory => {
+                "for example: pass 5 Hz, stop 7 Hz, 2 dB in the pass band, 20 dB in the stop band".into()
+            }
+            Self::StopAboveNyquist { nyquist, .. } => {
+                format!("choose a stop edge below {nyquist} Hz, or drop the filter")
+            }
+            Self::TooSteep { .. } => "move the stop edge away from the pass edge, or ask for less attenuation".into(),
+        };
+        Diagnostic::error(Code::FILTER_IMPOSSIBLE, self.to_string()).label(place, "this filter").help(help)
+    }
+}
 
 impl Butterworth {
     /// The lowest order that meets the specification at this sampling rate (Hz); the pass edge is met exactly, the stop

@@ -105,13 +105,14 @@ impl Prefilter {
     }
 
     /// trace(F^T F) for columns of `count` samples, ends and removed mean included: the expected sum of squares of
-    /// filtered white noise of variance one (the denominator of method 4.6).
+    /// filtered white noise of variance one (the denominator of method 4.6). Costs as much as filtering some thousand
+    /// columns where the filter is slow: keep the result.
     pub fn trace(&self, count: usize) -> f64 {
         let removed = if self.remove_mean && count > 0 { 1.0 } else { 0.0 };
         if self.sections.is_empty() || count < 2 {
             return count as f64 - removed;
         }
-        let reach = 2 * self.padding + 1;
+        let reach = self.padding + 1;
         let short = count.min(3 * reach);
         let operator = Self { remove_mean: false, ..self.clone() };
         let energy = |index: usize| {
@@ -120,7 +121,7 @@ impl Prefilter {
             operator.apply(&mut column);
             column.iter().map(|value| value * value).sum::<f64>()
         };
-        // Columns of F further than `reach` from both ends are shifted copies of one another.
+        // Columns of F further than `reach` from both ends are shifted copies of one another (to a millionth).
         let inner = if short < 3 * reach { 0 } else { short - 2 * reach };
         let ends: f64 = if inner == 0 {
             (0..short).map(energy).sum()
