@@ -63,6 +63,7 @@ impl<'a> Checker<'a> {
             kinds,
             motion,
             dimension,
+            replaces: replaced_ports(declaration),
             amplitudes,
             shapes,
             documentation,
@@ -240,6 +241,14 @@ impl<'a> Checker<'a> {
                 .help(expected);
         self.fail(diagnostic, SCOPE)
     }
+}
+
+fn replaced_ports(declaration: &crate::syntax::EffectDeclaration) -> Vec<String> {
+    let ports = declaration.actions.iter().filter_map(|action| match action {
+        EffectAction::Replaces(port, _) => Some(port.text.clone()),
+        EffectAction::Adds(_) => None,
+    });
+    ports.collect()
 }
 
 fn has_port(kind: PlaceKind, port: &str) -> bool {

@@ -7,10 +7,10 @@ use super::fields::find;
 use super::instance::{Instance, Progress};
 use super::kinds::{Kinds, coordinate_dimension, load_dimension, rate_dimension};
 use super::model::{ForcePlace, Motion, PlaceKind};
-use crate::diagnostics::{Code, Diagnostic, similar_name};
+use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use crate::expression::{Node, Symbol, Unary};
-use crate::quantities::{Dimension, Unit};
-use crate::syntax::{Declared, ElementPlace, Field, LawDeclaration, Name};
+use crate::quantities::{Dimension, Unit, named_type};
+use crate::syntax::{Declared, EffectAction, ElementPlace, Field, LawDeclaration, Name};
 
 const SCOPE: Scope = Scope::Study(Allowed::Constant);
 
@@ -369,6 +369,41 @@ impl<'a> Checker<'a> {
                 .label(span, "not one of them")
                 .secondary(restriction.span, "declared here");
             return self.fail(diagnostic, SCOPE);
+        }
+        let dimension = self.declared_value(entity).or(motion.map(load_dimension));
+        if let (Some(restriction), Some(dimension)) = (restriction, dimension)
+            && let Some(wanted) = named_type(&restriction.text)
+            && wanted.dimension != dimension
+        {
+            let message = format!("effect `{}` acts on values of type {} only", effect.name.text, restriction.text);
+            let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
+                .label(span, format!("this has {dimension}"))
+                .secondary(restriction.span, "declared here");
+            return self.fail(diagnostic, SCOPE);
+        }
+        self.check_replaced_ports(index, entity, span)
+    }
+
+    /// What the effect replaces is there: not every actuator has a `command`.
+    fn check_replaced_ports(&mut self, index: usize, entity: Entity, span: Span) -> Option<()> {
+        let effect = self.effect_of(index)?;
+        let site = match entity {
+            Entity::Force(force) => Site::Force(force),
+            Entity::Signal(signal) => Site::Signal(signal),
+            _ => return Some(()),
+        };
+        for action in &effect.actions {
+            if let EffectAction::Replaces(port, _) = action
+                && self.site_port(site, &port.text).is_none()
+            {
+                let name = self.site_name(site);
+                let message =
+                    format!("effect `{}` replaces `{}`, which `{name}` does not have", effect.name.text, port.text);
+                let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
+                    .label(span, format!("there is {}", self.site_ports(site).join(", ")))
+                    .secondary(port.span, "replaced here");
+                return self.fail(diagnostic, SCOPE);
+            }
         }
         Some(())
     }

@@ -351,6 +351,8 @@ pub struct Place {
     pub motion: Option<Motion>,
     /// Dimension of the value (input, measure, signal) or of the load.
     pub dimension: Dimension,
+    /// What an effect can replace here: `load`, `x`, `v`, `command`, ... Empty for joints.
+    pub ports: Vec<String>,
     /// Nodes for the place's typical magnitudes, where they exist: `coordinate`, `rate`, `load`, `value`.
     /// For a joint, `load` is the sum of the loads acting on it (kinematic symbols included).
     pub probes: Vec<(PlaceQuantity, Node)>,
@@ -375,11 +377,23 @@ pub struct EffectDeclaration {
     pub motion: Option<Motion>,
     /// `None`: any; else the dimension the place's value must have.
     pub dimension: Option<Dimension>,
+    /// Ports that it replaces.
+    pub replaces: Vec<String>,
     pub amplitudes: Vec<EffectParameter>,
     pub shapes: Vec<EffectParameter>,
     /// Shown with the candidate (`/// ...` in the declaration).
     pub documentation: String,
     pub is_prelude: bool,
+}
+
+impl EffectDeclaration {
+    /// Whether the effect can act at this place of the study.
+    pub fn fits(&self, place: &Place) -> bool {
+        self.kinds.contains(&place.kind)
+            && self.motion.is_none_or(|motion| place.motion == Some(motion))
+            && self.dimension.is_none_or(|dimension| dimension == place.dimension)
+            && self.replaces.iter().all(|port| place.ports.contains(port))
+    }
 }
 
 /// An amplitude (zero means: not there) or a shape parameter of an effect.

@@ -45,7 +45,7 @@ impl<'a> Checker<'a> {
         probes.push((PlaceQuantity::Load, self.load_magnitude(symbols, load)));
         let name = self.declared.joints[joint].name.text.clone();
         let dimension = load_dimension(motion);
-        Some(Place { kind: PlaceKind::Joint, name, motion: Some(motion), dimension, probes })
+        Some(Place { kind: PlaceKind::Joint, name, motion: Some(motion), dimension, ports: Vec::new(), probes })
     }
 
     /// Size of what acts on a joint: its elements' loads and the load that accelerates what it moves, as root of the sum of
@@ -111,12 +111,20 @@ impl<'a> Checker<'a> {
             probes.extend(command.map(|command| (PlaceQuantity::Value, command.node)));
         }
         let name = element.name.text.clone();
-        Some(Place { kind, name, motion: Some(placed.motion), dimension: load.dimension, probes })
+        let mut ports = self.site_ports(Site::Force(force));
+        ports.retain(|port| port != "inertia");
+        Some(Place { kind, name, motion: Some(placed.motion), dimension: load.dimension, ports, probes })
     }
 }
 
 fn value_place(kind: PlaceKind, name: &str, dimension: Dimension, value: Node) -> Place {
-    Place { kind, name: name.to_owned(), motion: None, dimension, probes: vec![(PlaceQuantity::Value, value)] }
+    let ports: &[&str] = match kind {
+        PlaceKind::Input => &["u", "value"],
+        PlaceKind::Measure => &["y", "value"],
+        _ => &["value"],
+    };
+    let ports = ports.iter().map(|port| (*port).to_owned()).collect();
+    Place { kind, name: name.to_owned(), motion: None, dimension, ports, probes: vec![(PlaceQuantity::Value, value)] }
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

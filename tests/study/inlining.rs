@@ -95,7 +95,7 @@ fn filters_break_circles_of_signals() {
         "{SLIDE}law first(u: voltage) -> voltage {{ param lag: time
          state z: voltage from 0 V {{ z' = (u - z) / lag }}
          = z }}
-         signal a: first {{ u = p - b, lag = 1 ms }}\nsignal b = 2 * a"
+         signal a: first {{ u = p - back, lag = 1 ms }}\nsignal back = 2 * a"
     ));
     assert_eq!(study.signals.len(), 2);
 }
@@ -120,7 +120,7 @@ fn past_and_rate_of_inputs() {
 fn conditions_and_powers() {
     let study = study(&format!(
         "{SLIDE}measure a = if t >= 1 s and not_late > 0 or t < 0.1 s then 2^3^2 else -2^2
-        signal not_late = if t <= 2 s then 1 else 0\nmeasure b = (4 m^2)^1.5 / (1 m^3) + (9 s^2)^0.5 / (1 s)"
+        signal not_late = if t <= 2 s then 1 else 0\nmeasure c = (4 m^2)^1.5 / (1 m^3) + (9 s^2)^0.5 / (1 s)"
     ));
     let measured = |index: usize, t: f64| value(&study, study.measures[index].value, &[("t", t)]);
     for (t, expected) in [(0.05, 512.0), (0.5, -4.0), (1.0, 512.0), (2.0, 512.0), (2.1, -4.0)] {
@@ -157,7 +157,9 @@ fn effects_on_inputs_measures_and_commands() {
         "{SLIDE}actuator a: amplifier on guide {{ command = u, gain = 2 N/m }}
         effect late: input_delay on u {{ tau = 4 ms }}\neffect weak: input_gain on u {{ g = -0.1 }}
         effect shift: sensor_offset on z {{ b = 1 mm }}\neffect slow: sensor_lag on z {{ tau = 2 ms }}
-        effect dead: actuator_dead_band on a {{ gap = 0.2 m }}"
+        effect dead: dead_band on a {{ gap = 0.2 m }}
+        effect dead_band at any actuator {{ amplitude gap: value one_sided finite
+          replaces command by command - max(min(command, gap / 2), -gap / 2) }}"
     ));
     let u = 0.9 * 0.496f64.sin();
     let values = [("t", 0.5), ("guide.position", 0.3), ("slow.z", 0.7)];

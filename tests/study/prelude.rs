@@ -2,8 +2,9 @@
 
 use crate::evaluate::{study, value};
 use ident::expression::Node;
+use ident::quantities::{Dimension, Unit, named_type};
 use ident::study::{PlaceKind, Study, load_text};
-use ident::syntax::{Declared, EffectDeclaration, ItemKind, LawDeclaration, Tree, TypeExpression};
+use ident::syntax::{Declared, EffectDeclaration, ItemKind, LawDeclaration, Tree};
 
 /// A machine with one place of every kind, translational and rotational.
 const MACHINE: &str = "study machine
@@ -43,45 +44,29 @@ fn items<T>(pick: impl Fn(&ItemKind) -> Option<T>) -> Vec<(T, String)> {
     all.filter_map(|item| Some((pick(&item.kind)?, item.documentation.clone()))).collect()
 }
 
-/// SI unit of a type where coordinates are in `coordinate`, loads in `load`, values in `value`.
-fn unit(kind: &TypeExpression, [coordinate, load, value]: [&str; 3]) -> String {
-    let factors: Vec<String> = kind
-        .factors
-        .iter()
-        .map(|(name, exponent)| {
-            let unit = match name.text.as_str() {
-                "coordinate" => coordinate.to_owned(),
-                "rate" => format!("{coordinate}/s"),
-                "acceleration" => format!("{coordinate}/s^2"),
-                "load" => load.to_owned(),
-                "value" => value.to_owned(),
-                "frequency" => "Hz".to_owned(),
-                other => ident::quantities::named_type(other).expect("a named type").dimension.symbol(),
-            };
-            format!("({unit})^{exponent}")
-        })
-        .collect();
-    match kind.factors.as_slice() {
-        [] => String::new(),
-        [(name, 1)] if name.text == "frequency" => "Hz".to_owned(),
-        _ => format!("1*{}", factors.join("*")).replace("1*", ""),
+/// A number with the SI unit of its declared type, where coordinates are in `coordinate`, loads in `load`, values in
+/// `value`.
+fn number(number: f64, declared: &Declared, [coordinate, load, value]: [&str; 3]) -> String {
+    let Some(kind) = &declared.kind else { return format!("{number}") };
+    if let [(name, 1)] = kind.factors.as_slice()
+        && name.text == "frequency"
+    {
+        return format!("{number} Hz");
     }
-}
-
-fn number(number: f64, declared: &Declared, units: [&str; 3]) -> String {
-    match &declared.kind {
-        Some(kind) if kind.factors.iter().all(|(name, _)| name.text == "ratio") => format!("{number}"),
-        Some(kind) => {
-            let parsed = ident::quantities::Unit::parse(&unit(kind, units)).expect("a unit");
-            // Written anew by its dimension; Hz stays what it is.
-            if parsed.symbol == "Hz" {
-                format!("{number} Hz")
-            } else {
-                format!("{number} {}", parsed.dimension.symbol())
-            }
-        }
-        None => format!("{number}"),
+    let mut dimension = Dimension::ONE;
+    for (name, exponent) in &kind.factors {
+        let of = |unit: &str| Unit::parse(unit).expect("a unit").dimension;
+        let factor = match name.text.as_str() {
+            "coordinate" => of(coordinate),
+            "rate" => of(coordinate) / Dimension::TIME,
+            "acceleration" => of(coordinate) / Dimension::TIME / Dimension::TIME,
+            "load" => of(load),
+            "value" => of(value),
+            other => named_type(other).expect("a named type").dimension,
+        };
+        dimension = dimension * factor.power(i32::from(*exponent)).expect("a dimension");
     }
+    if dimension.is_one() { format!("{number}") } else { format!("{number} {}", dimension.symbol()) }
 }
 
 /// `{ a = .., group.b = .. }`
@@ -220,7 +205,7 @@ fn the_catalogue_is_data_for_diagnosis() {
     assert_eq!(format!("{monomial:?}"), "[(Load, 1), (Rate, -2)]");
     let delay = find("input_delay");
     assert_eq!(delay.amplitudes[0].range, Some((0.0, 0.1)));
-    assert_eq!(delay.amplitudes[0].dimension, Some(ident::quantities::Dimension::TIME));
+    assert_eq!(delay.amplitudes[0].dimension, Some(Dimension::TIME));
     assert_eq!(delay.amplitudes[0].unit.as_ref().map(|unit| unit.symbol.as_str()), Some("ms"));
     assert!(find("backlash").amplitudes[0].finite_only);
     let drift = find("sensor_drift");
