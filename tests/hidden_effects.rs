@@ -26,7 +26,7 @@ const CASES: [Case; 38] = [
     case("two_mass", "backlash", "coupling", Medium, 12),
     case("two_mass", "dry_friction", "bearing", Medium, 13),
     case("two_mass", "quadratic_drag", "bearing", Strong, 14),
-    case("two_mass", "cubic_stiffness", "coupling", Medium, 15),
+    case("two_mass", "cubic_stiffness", "shaft", Medium, 15),
     case("two_mass", "actuator_limit", "motor_torque", Strong, 16),
     case("two_mass", "input_delay", "torque", Medium, 17),
     case("two_mass", "harmonic_disturbance", "bearing", Strong, 18),
