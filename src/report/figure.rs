@@ -8,8 +8,8 @@ use crate::report::{number, words};
 
 const WIDTH: f64 = 900.0;
 const HEIGHT: f64 = 420.0;
-/// Room for the title.
-const TOP: f64 = 48.0;
+/// Room for the two lines of the title.
+const TOP: f64 = 56.0;
 /// Width of the histories where a missing force stands beside them.
 const LEFT_WIDTH: f64 = 540.0;
 /// The part of a long record that is drawn: short enough to show single reversals.
@@ -17,7 +17,7 @@ const LONGEST_STRETCH: f64 = 0.5;
 
 const STYLE: &str = "\
 text{font:12px system-ui,'Segoe UI','Helvetica Neue','DejaVu Sans',sans-serif;fill:#59636e}\
-text.label{fill:#1b1f24}text.title{font-size:17px;font-weight:600;fill:#1b1f24}\
+text.label{fill:#1b1f24}text.title{font-weight:600;fill:#1b1f24}text.gain{font-size:14px}\
 path{fill:none}.paper{fill:#fff}.grid{stroke:#e9ecef}.zero{stroke:#c5ccd3}.frame{stroke:#59636e}\
 .line{stroke-width:1.2;stroke-linejoin:round}.line.key{stroke-width:2.5}\
 .line.measured{stroke:#4b5563;stroke-width:1.6}.line.before{stroke:#d55e00}.line.after{stroke:#0072b2}\
@@ -31,12 +31,16 @@ path{fill:none}.paper{fill:#fff}.grid{stroke:#e9ecef}.zero{stroke:#c5ccd3}.frame
 pub fn summary(answer: &Answer) -> String {
     let named = places(answer).into_iter().find(|(named, _)| *named).map(|(_, missing)| missing);
     let width = if named.is_some() { LEFT_WIDTH } else { WIDTH };
+    let title = title(answer);
     let histories = shown(answer).map_or(String::new(), |(record, index)| histories(answer, record, index, width));
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\">\
          <style>{STYLE}</style><rect class=\"paper\" width=\"{WIDTH}\" height=\"{HEIGHT}\"/>\
-         <text class=\"title\" x=\"14\" y=\"27\">{}</text>{histories}{}</svg>\n",
-        escape(&title(answer)),
+         <text class=\"title\" x=\"14\" y=\"24\" style=\"font-size:{}px\">{}</text>\
+         <text class=\"gain\" x=\"14\" y=\"44\">{}</text>{histories}{}</svg>\n",
+        title_size(&title),
+        escape(&title),
+        escape(&gain(answer)),
         named.map_or(String::new(), force),
     )
 }
@@ -44,14 +48,26 @@ pub fn summary(answer: &Answer) -> String {
 fn title(answer: &Answer) -> String {
     let causes: Vec<&str> = words::accepted(answer).iter().map(|(_, candidate)| candidate.name.as_str()).collect();
     let verdict = words::verdict(&answer.verdict);
-    let named = if causes.is_empty() { String::new() } else { format!(": {}", causes.join(", ")) };
-    let gain = match (answer.base.validation_discrepancy, answer.extended.validation_discrepancy) {
+    if causes.is_empty() { verdict.to_string() } else { format!("{verdict}: {}", causes.join(", ")) }
+}
+
+/// Smaller type for titles that would not fit, px.
+fn title_size(title: &str) -> f64 {
+    const LARGEST: f64 = 17.0;
+    /// Average advance of bold type, as a share of its size.
+    const ADVANCE: f64 = 0.62;
+    let fitting = (WIDTH - 28.0) / (ADVANCE * title.chars().count().max(1) as f64);
+    (10.0 * fitting.min(LARGEST)).floor() / 10.0
+}
+
+fn gain(answer: &Answer) -> String {
+    match (answer.base.validation_discrepancy, answer.extended.validation_discrepancy) {
         (Some(before), Some(after)) if answer.extension.is_some() => {
-            format!(" (held-out discrepancy {} \u{2192} {})", number::percent(before), number::percent(after))
+            format!("held-out discrepancy {} \u{2192} {}", number::percent(before), number::percent(after))
         }
-        _ => String::new(),
-    };
-    format!("{verdict}{named}{gain}")
+        (Some(before), _) => format!("held-out discrepancy {}", number::percent(before)),
+        (None, _) => format!("discrepancy {}, no held-out record", number::percent(answer.base.estimation_discrepancy)),
+    }
 }
 
 /// The record and channel that show best what was gained.

@@ -61,13 +61,13 @@ impl Scale {
             figures: values.iter().map(|value| value.map_or("-".into(), number::percent)).collect(),
             bars_svg: bars(&drawn, self.full, BAR_WIDTH),
         });
-        // A single channel has the discrepancy of its record: one row says both.
+        // A single channel has the discrepancy of its record or group: one row says both.
         let mut innermost = node;
         while let [only] = innermost.children.as_slice() {
             innermost = only;
         }
         if innermost.children.is_empty() {
-            if depth == 0 && innermost.name != node.name {
+            if innermost.name != node.name {
                 rows.last_mut().into_iter().for_each(|row| row.name.push_str(&format!(": {}", innermost.name)));
             }
             return;
