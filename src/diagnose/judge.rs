@@ -3,7 +3,7 @@
 use super::candidates::{Candidate, UnknownRole};
 use super::refit::Refitted;
 use super::round::{Round, deviance, effective_counts};
-use super::{Candidate as Reported, Refit};
+use super::{Candidate as Reported, Refit, Strength};
 use crate::fit::LeastSquares;
 use crate::identify::{Fitted, Problem, confidence, prefilters};
 use crate::simulation::{Compiled, Record};
@@ -181,7 +181,7 @@ fn visible_change(round: &Round, refitted: &Refitted) -> f64 {
     largest
 }
 
-fn candidate_parameters(refitted: &Refitted, candidate: &Candidate) -> Vec<(String, f64, Option<(f64, f64)>, String)> {
+fn candidate_parameters(refitted: &Refitted, candidate: &Candidate) -> Vec<Strength> {
     let confidence = confidence(&refitted.compiled, &refitted.fitted);
     candidate
         .unknowns

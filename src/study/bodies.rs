@@ -250,9 +250,9 @@ impl<'a> Checker<'a> {
         for joint in self.topology.chain(attachment.body) {
             let Some((_, parent, child)) = self.topology.joints[joint] else { continue };
             let (parent, child) = (self.attachment(parent), self.attachment(child));
-            for axis in 0..3 {
-                let from_child = self.graph.subtract(position[axis], child.position[axis]);
-                position[axis] = self.graph.add(from_child, parent.position[axis]);
+            for ((coordinate, of_child), of_parent) in position.iter_mut().zip(child.position).zip(parent.position) {
+                let from_child = self.graph.subtract(*coordinate, of_child);
+                *coordinate = self.graph.add(from_child, of_parent);
             }
         }
         position

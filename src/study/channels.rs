@@ -190,14 +190,12 @@ impl<'a> Checker<'a> {
                 .help("partial costs add up along the tree, so each channel belongs to one group")
         };
         if let Some(Entity::Measure(measure)) = self.entities.get(member.text.as_str()).copied() {
-            match owner[measure].replace(member) {
-                Some(first) => self.report(twice(first), SCOPE),
-                None => {}
+            if let Some(first) = owner[measure].replace(member) {
+                self.report(twice(first), SCOPE);
             }
         } else if let Some(inner) = declared.groups.iter().position(|(name, _)| name.text == member.text) {
-            match parent[inner].replace(group) {
-                Some(first) => self.report(twice(declared.groups[first].0), SCOPE),
-                None => {}
+            if let Some(first) = parent[inner].replace(group) {
+                self.report(twice(declared.groups[first].0), SCOPE);
             }
         } else {
             let measures = declared.measures.iter().map(|measure| measure.name.text.as_str());

@@ -103,8 +103,8 @@ impl<'a> Checker<'a> {
         let node = match operator {
             Operator::Less => self.graph.binary(Binary::Less, a, b),
             Operator::Greater => self.graph.binary(Binary::Less, b, a),
-            // a <= b is: not b < a.
-            Operator::LessEqual | _ => {
+            // The others are negations: a <= b is not b < a.
+            _ => {
                 let (low, high) = if operator == Operator::LessEqual { (b, a) } else { (a, b) };
                 let strictly = self.graph.binary(Binary::Less, low, high);
                 let one = self.graph.constant(1.0);

@@ -142,10 +142,11 @@ fn power(dimension: Dimension, exponent: i8) -> Dimension {
     dimension.power(i32::from(exponent)).unwrap_or_default()
 }
 
+/// Powers of place quantities.
+pub(super) type Monomial = Vec<(PlaceQuantity, i8)>;
+
 /// The type as data for diagnosis: a monomial of place quantities, or a fixed dimension when it has none.
-pub(super) fn monomial(
-    expression: &TypeExpression,
-) -> Result<(Vec<(PlaceQuantity, i8)>, Option<Dimension>), Diagnostic> {
+pub(super) fn monomial(expression: &TypeExpression) -> Result<(Monomial, Option<Dimension>), Diagnostic> {
     let mut monomial: Vec<(PlaceQuantity, i8)> = Vec::new();
     let mut fixed = Dimension::ONE;
     let mut multiply = |quantity: PlaceQuantity, exponent: i8| match monomial.iter_mut().find(|part| part.0 == quantity)

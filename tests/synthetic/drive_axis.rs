@@ -61,9 +61,8 @@ fn least_squares(columns: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
         for row in 0..count {
             if row != pivot {
                 let factor = rows[row][pivot] / rows[pivot][pivot];
-                for column in 0..=count {
-                    rows[row][column] -= factor * rows[pivot][column];
-                }
+                let pivot_row = rows[pivot].clone();
+                rows[row].iter_mut().zip(&pivot_row).for_each(|(value, above)| *value -= factor * above);
             }
         }
     }

@@ -16,8 +16,10 @@ pub struct Shipped {
     pub record: Record,
 }
 
-/// Study, place and effect.
-const HIDDEN: [(&str, &str, fn(usize) -> Effect); 4] = [
+/// Study, place and effect there.
+type Hidden = (&'static str, &'static str, fn(usize) -> Effect);
+
+const HIDDEN: [Hidden; 4] = [
     ("quarter_vehicle", "chassis_guide", |place| Effect::DryFriction { place, load: 60.0 }),
     ("two_mass", "coupling", |place| Effect::Backlash { place, gap: 0.025 }),
     ("crane_pendulum", "hook", |place| Effect::QuadraticDrag { place, factor: 0.2 }),
