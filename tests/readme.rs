@@ -104,7 +104,7 @@ fn keys(text: &str) -> BTreeSet<String> {
                     && part.starts_with(|c: char| c.is_ascii_uppercase())
                     && part.chars().all(char::is_alphabetic)
             };
-            is_year && !authors.is_empty() && authors.iter().all(|part| is_name(part))
+            is_year && !authors.is_empty() && authors.iter().all(is_name)
         })
         .map(str::to_owned)
         .collect()

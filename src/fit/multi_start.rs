@@ -5,7 +5,7 @@ use super::problem::{Bounds, Control, Estimate, FitError, LeastSquares, Options,
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
-/// `count` points in [0,1]^dimension, one in every one of `count` slices of each axis (McKay-1979); the same for the
+/// `count` points in `[0,1]^dimension`, one in every one of `count` slices of each axis (McKay-1979); the same for the
 /// same seed on every machine.
 pub fn latin_hypercube(count: usize, dimension: usize, seed: u64) -> Vec<Vec<f64>> {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);

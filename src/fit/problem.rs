@@ -54,7 +54,7 @@ impl Bounds {
         self.lower.is_empty()
     }
 
-    /// Width where both bounds are finite, else 1: the scale that maps a bounded parameter to [0,1] (method 2).
+    /// Width where both bounds are finite, else 1: the scale that maps a bounded parameter to `[0,1]` (method 2).
     pub fn scale(&self, index: usize) -> f64 {
         let width = self.upper[index] - self.lower[index];
         if width.is_finite() && width > 0.0 { width } else { 1.0 }
