@@ -11,8 +11,8 @@
 //! syntax       text                -> Tree
 //! study        Tree                -> Study      names, dimensions, variants, topology
 //! mechanics    Study               -> System     equations of motion as expressions
+//! integrate    problem             -> Solution   equilibrium, BDF, Runge-Kutta, sensitivities in step
 //! tape         System              -> Model      residual, sparse Jacobian, parameter derivatives as closures
-//! integrate    Model               -> Solution   equilibrium, BDF, sensitivities in step
 //! signal       files               -> records    measured data, filters, spectra
 //! simulation   Model + experiment  -> Trajectory measured channels and their gradient
 //! fit          residuals           -> estimate   cost, scaling, Levenberg-Marquardt with bounds

@@ -18,6 +18,9 @@ pub(super) struct Arguments {
     /// Write the answer as one self-contained page
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Write the picture of the answer (before and after, the missing force) as SVG
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
     /// Add at most this many extensions one after the other
     #[arg(long, default_value_t = 4)]
     extensions: usize,
@@ -40,6 +43,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
             Failed
         })?;
         write_whole(path, &page)?;
+    }
+    if let Some(path) = &arguments.figure {
+        write_whole(path, &report::figure::summary(&answer))?;
     }
     match study.format {
         Format::Text => print!("{}", report::terminal::answer(&answer)),

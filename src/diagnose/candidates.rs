@@ -119,19 +119,13 @@ pub(super) fn candidates(study: &Study, typical: &[Typical]) -> Vec<Candidate> {
     let mut list = Vec::new();
     for effect in &study.effects {
         for (place, typical) in study.places.iter().zip(typical) {
-            if fits(effect, place) && !stands_at_joint(study, effect, place) {
+            if effect.fits(place) && !stands_at_joint(study, effect, place) {
                 list.extend(effect_candidate(study, effect, place, typical));
             }
         }
     }
     list.extend(study.constants.iter().filter_map(|constant| freed_constant(study, constant)));
     list
-}
-
-fn fits(effect: &EffectDeclaration, place: &Place) -> bool {
-    effect.kinds.contains(&place.kind)
-        && effect.motion.is_none_or(|motion| place.motion == Some(motion))
-        && effect.dimension.is_none_or(|dimension| dimension == place.dimension)
 }
 
 /// Names of the candidates that [`stands_at_joint`] leaves out in favour of this one.
@@ -142,7 +136,7 @@ fn aliases(study: &Study, effect: &EffectDeclaration, place: &Place) -> Vec<Stri
     let joint = study.joints.iter().position(|joint| joint.name == place.name);
     let same = |force: &&crate::study::Force| matches!((force.place, joint), (ForcePlace::Joint(a), Some(b)) if a == b);
     let fitting =
-        |force: &&crate::study::Force| study.places.iter().any(|other| other.name == force.name && fits(effect, other));
+        |force: &&crate::study::Force| study.places.iter().any(|other| other.name == force.name && effect.fits(other));
     study.forces.iter().filter(same).filter(fitting).map(|force| format!("{} at {}", effect.name, force.name)).collect()
 }
 

@@ -148,7 +148,10 @@ fn effects_compose_in_order_of_declaration() {
     assert!(study.places.iter().all(|place| place.name != "rub"), "effects are no places for effects");
     let sums = study.places.iter().find(|place| place.name == "guide").expect("the joint");
     let total = sums.probes.iter().find(|(quantity, _)| *quantity == PlaceQuantity::Load).expect("its load").1;
-    close(value(&study, total, &values), load(&study, "s", &values) + load(&study, "rub", &values));
+    // Inertia 3 kg at 2 m/s^2: the load that accelerates is added as root of the sum of squares.
+    let moving = [values.as_slice(), &[("guide.inertia", 3.0), ("guide.acceleration", 2.0)]].concat();
+    let applied = load(&study, "s", &values) + load(&study, "rub", &values);
+    close(value(&study, total, &moving), applied.hypot(6.0));
 }
 
 #[test]

@@ -152,6 +152,8 @@ fn affected(study: &Study, kind: &str, place: &str) -> Node {
 fn effects_compile_at_every_place_and_vanish_at_their_neutral_strength() {
     let catalogue = study(MACHINE).effects;
     let effects = prelude_effects();
+    let base = study(MACHINE);
+    let mut checked = 0;
     assert!(effects.len() >= 24, "{}", effects.len());
     assert_eq!(catalogue.len(), effects.len());
     for ((effect, documentation), data) in effects.iter().zip(&catalogue) {
@@ -159,6 +161,11 @@ fn effects_compile_at_every_place_and_vanish_at_their_neutral_strength() {
         assert!(!documentation.trim().is_empty() && !data.title.is_empty(), "{} has no documentation", data.name);
         for kind in &effect.places {
             for (place, units) in places(&kind.text) {
+                // An effect that replaces a port needs a law that has it: no backlash in a damper.
+                if !base.places.iter().any(|candidate| candidate.name == place && data.fits(candidate)) {
+                    continue;
+                }
+                checked += 1;
                 let with = |size: f64| {
                     let amplitudes = fields(effect.amplitudes.iter(), size, units);
                     let shapes = fields(effect.shapes.iter(), 0.5, units);
@@ -175,7 +182,6 @@ fn effects_compile_at_every_place_and_vanish_at_their_neutral_strength() {
                     continue;
                 }
                 let weak = with(0.0);
-                let base = study(MACHINE);
                 let undisturbed =
                     if kind.text == "joint" { 0.0 } else { value(&base, affected(&base, &kind.text, place), &VALUES) };
                 let neutral = value(&weak, affected(&weak, &kind.text, place), &VALUES);
@@ -188,6 +194,7 @@ fn effects_compile_at_every_place_and_vanish_at_their_neutral_strength() {
             }
         }
     }
+    assert!(checked >= effects.len(), "only {checked} placements fit");
 }
 
 #[test]
