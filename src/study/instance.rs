@@ -165,8 +165,8 @@ impl<'a> Checker<'a> {
             known.extend(self.site_ports(instance.site));
         }
         known.extend(["t".to_owned(), "pi".to_owned()]);
-        let sort = if instance.is_effect { "effect" } else { "law" };
-        let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no `{}` in this {sort}", name.text))
+        let message = format!("there is no `{}` in this declaration", name.text);
+        let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, message)
             .label(name.span, "not declared here")
             .suggest(similar_name(&name.text, known.iter().map(String::as_str)))
             .note(format!("known here: {}", known.join(", ")));
@@ -181,12 +181,13 @@ impl<'a> Checker<'a> {
             let Some(kind) = &declared.kind else { return Some(value) };
             let form = checker.form(kind)?;
             checker.infer_kinds(index);
-            let span = checker.field_span(index, name).unwrap_or(declared.span);
-            checker.check_writing(kind, value, span, declared.span)?;
+            let written = declared.name.span.to(kind.span);
+            let span = checker.field_span(index, name).unwrap_or(written);
+            checker.check_writing(kind, value, span, written)?;
             let wanted = form.dimension(&checker.instances[index].kinds);
             let Some(wanted) = wanted else { return checker.fail_inference(index, declared) };
             let because = format!("`{name}`");
-            checker.expect(value, span, wanted, (declared.span, &because), Scope::Study(Allowed::Constant))
+            checker.expect(value, span, wanted, (written, &because), Scope::Study(Allowed::Constant))
         })
     }
 

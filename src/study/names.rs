@@ -27,9 +27,14 @@ pub(super) fn declare<'a>(
     if let Some((first_sort, first)) = names.insert(&name.text, (sort, name)) {
         diagnostics.push(
             Diagnostic::error(Code::DUPLICATE_NAME, format!("`{}` is declared twice", name.text))
-                .label(name.span, format!("second declaration, a {sort}"))
-                .secondary(first.span, format!("first declaration, a {first_sort}"))
+                .label(name.span, format!("second declaration, {}", with_article(sort)))
+                .secondary(first.span, format!("first declaration, {}", with_article(first_sort)))
                 .help("rename one of them; in a variant use `replace` to exchange a declaration"),
         );
     }
+}
+
+fn with_article(noun: &str) -> String {
+    let article = if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    format!("{article} {noun}")
 }

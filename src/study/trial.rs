@@ -30,7 +30,9 @@ impl<'a> Checker<'a> {
 
     fn try_law(&mut self, law: &'a LawDeclaration) {
         let index = self.imagine(&law.name, &law.bindings, &law.states);
-        self.imagine_names(index, law.ports.iter().chain(&law.parameters));
+        if !self.imagine_names(index, law.ports.iter().chain(&law.parameters)) {
+            return;
+        }
         self.check_inside(index, &law.bindings, &law.states);
         let value = self.evaluate(&law.value, Scope::Instance(index));
         let form = self.form(&law.result);
@@ -43,7 +45,9 @@ impl<'a> Checker<'a> {
 
     fn try_effect(&mut self, effect: &'a EffectDeclaration) {
         let index = self.imagine(&effect.name, &effect.bindings, &effect.states);
-        self.imagine_names(index, effect.amplitudes.iter().chain(&effect.shapes));
+        if !self.imagine_names(index, effect.amplitudes.iter().chain(&effect.shapes)) {
+            return;
+        }
         let main = effect.places.first().map_or("load", |place| match place.text.as_str() {
             "input" => "u",
             "measure" => "y",
@@ -86,8 +90,9 @@ impl<'a> Checker<'a> {
         index
     }
 
-    /// Every declared name becomes a quantity of its declared dimension.
-    fn imagine_names(&mut self, index: usize, declared: impl Iterator<Item = &'a Declared>) {
+    /// Every declared name becomes a quantity of its declared dimension. False if a type cannot be read.
+    fn imagine_names(&mut self, index: usize, declared: impl Iterator<Item = &'a Declared>) -> bool {
+        let mut readable = true;
         let mut seen: Vec<&'a Name> = Vec::new();
         for declared in declared {
             if let Some(first) = seen.iter().find(|name| name.text == declared.name.text) {
@@ -103,6 +108,7 @@ impl<'a> Checker<'a> {
                     Ok(form) => form.dimension(&self.instances[index].kinds).unwrap_or_default(),
                     Err(diagnostic) => {
                         self.report(diagnostic, Scope::Study(Allowed::Number));
+                        readable = false;
                         continue;
                     }
                 },
@@ -116,6 +122,7 @@ impl<'a> Checker<'a> {
                 self.expect(value, default.span, dimension, because, Scope::Instance(index));
             }
         }
+        readable
     }
 
     fn imagine_ports(&mut self, index: usize, effect: &'a EffectDeclaration) {
