@@ -1,6 +1,7 @@
 //! The system together with its sensitivity equations, in the layout the inner loops want.
 
 use super::problem::{Dynamics, Work};
+use super::structure::Structure;
 
 /// Wraps [`Dynamics`] for a vector `z` of length n (1 + p): first y, then the sensitivities row by row (component i,
 /// then parameter j), so that operations on a row run over all parameters without a gap.
@@ -11,6 +12,7 @@ pub(super) struct Augmented<'d, D: ?Sized> {
     pub p: usize,
     pub work: Work,
     pub explicit: bool,
+    pub structure: Structure,
     /// Right-hand sides are never evaluated beyond this time, so that a step that ends at a discontinuity of the input
     /// sees its left limit.
     pub last_time: f64,
@@ -23,7 +25,7 @@ pub(super) struct Augmented<'d, D: ?Sized> {
 }
 
 impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
-    pub fn new(dynamics: &'d mut D, with_sensitivities: bool, t: f64, y: &[f64]) -> Self {
+    pub fn new(dynamics: &'d mut D, with_sensitivities: bool, t: f64, y: &[f64], y_prime: &[f64]) -> Self {
         let n = dynamics.dimension();
         let p = if with_sensitivities { dynamics.parameter_count() } else { 0 };
         let pattern = dynamics.pattern();
@@ -34,6 +36,7 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
                 .collect(),
             _ => (0..p).flat_map(|j| (0..n).map(move |row| row * p + j)).collect(),
         };
+        let structure = Structure::new(dynamics, t, y, y_prime);
         let explicit = dynamics.explicit_rates(t, y, &mut vec![0.0; n]);
         let work = Work { limited_by: vec![0; n], limited_span: vec![(f64::NAN, f64::NAN); n], ..Work::default() };
         Self {
@@ -42,6 +45,7 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
             p,
             work,
             explicit,
+            structure,
             last_time: f64::INFINITY,
             jacobian: vec![0.0; jacobian_rows.len()],
             mass: vec![0.0; jacobian_rows.len()],
@@ -118,6 +122,20 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
         self.dynamics.parameter_entries(t.min(self.last_time), y, y_prime, &mut self.parameter);
         result.fill(0.0);
         self.subtract_parameter_entries(result);
+    }
+
+    /// `-(dF/dy S + dF/dtheta)` into `result` (n x p row by row), derivatives held.
+    pub fn held_derivative_right_hand_side(
+        &mut self,
+        t: f64,
+        y: &[f64],
+        y_prime: &[f64],
+        s: &[f64],
+        result: &mut [f64],
+    ) {
+        self.linearise(t, y, y_prime, 0.0);
+        self.parameter_right_hand_side(t, y, y_prime, result);
+        subtract_product(&self.jacobian, &self.jacobian_rows, &self.jacobian_columns, s, result, self.p);
     }
 
     fn subtract_parameter_entries(&self, target: &mut [f64]) {

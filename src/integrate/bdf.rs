@@ -112,7 +112,7 @@ impl Bdf {
         let mut error_failures = 0;
         loop {
             let (step, reaches_end) = limits.fit(self.history.step, self.history.time, end);
-            limits.check(system, self.history.time, step, reaches_end, self.trouble)?;
+            limits.check(system, self.history.time, step, end, self.trouble)?;
             self.history.resize(step);
             self.history.begin();
             let step_end = if reaches_end { end } else { self.history.time + step };
@@ -150,8 +150,7 @@ impl Bdf {
         self.history.begin();
         self.history.predict(&mut self.z, &mut self.z_prime);
         self.correction.fill(0.0);
-        let refuse =
-            |failure: NewtonFailure| Refusal { time: start, cause: failure.cause, component: failure.component };
+        let refuse = |failure: NewtonFailure| Refusal::new(start, failure.cause).blaming(failure.component);
         let n = system.n;
         self.newton.polish(system, &self.norm, &mut step_end!(self, end, n)).map_err(refuse)?;
         self.solve_sensitivities(system, end).map_err(refuse)?;

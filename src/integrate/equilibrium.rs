@@ -68,7 +68,7 @@ pub fn equilibrium<D: Dynamics + ?Sized>(
 }
 
 fn fail(time: f64, cause: FailureCause, component: Option<usize>, work: Work) -> Failure {
-    Failure { time, cause, component, work: Box::new(work) }
+    Failure { time, cause, component, equations: Vec::new(), work: Box::new(work) }
 }
 
 type Outcome<T> = Result<T, (FailureCause, Option<usize>)>;

@@ -16,11 +16,14 @@ mod problem;
 mod recorder;
 mod run;
 mod runge_kutta;
+mod start;
 mod stepper;
+mod structure;
 mod tsitouras;
 
 pub use equilibrium::{Equilibrium, equilibrium};
 pub use problem::*;
+pub use start::consistent_start;
 
 use run::Run;
 
@@ -46,9 +49,12 @@ pub fn integrate<D: Dynamics + ?Sized>(
     if !run.is_possible() {
         return Err(invalid(start.time, None));
     }
-    run.take_start();
     let mut planned = 0;
-    for (end, discontinuous) in segments(start.time, times, breakpoints) {
+    let segments = segments(start.time, times, breakpoints);
+    if let Err(refusal) = run.take_start(segments.first().map_or(start.time, |segment| segment.0)) {
+        return Err(refusal.with_work(run.system.work));
+    }
+    for (end, discontinuous) in segments {
         let outcome = match &options.follow_plan {
             Some(plan) => run.follow(plan, planned, end, discontinuous).map(|next| planned = next),
             None => run.segment(end, discontinuous),
@@ -103,5 +109,5 @@ fn check<D: Dynamics + ?Sized>(dynamics: &D, start: &Start, times: &[f64], optio
 }
 
 fn invalid(time: f64, component: Option<usize>) -> Failure {
-    Failure { time, cause: FailureCause::InvalidRequest, component, work: Box::default() }
+    Failure { time, cause: FailureCause::InvalidRequest, component, equations: Vec::new(), work: Box::default() }
 }

@@ -74,6 +74,11 @@ pub(super) struct Newton {
     /// Leading coefficient of the last step solved.
     last_leading: f64,
     delta: Vec<f64>,
+    /// Columns of multipliers: scaled by the leading coefficient, so that the matrix stays well conditioned however
+    /// short the step (Hairer-Wanner-1996, VII.4).
+    is_multiplier: Vec<bool>,
+    has_multipliers: bool,
+    scaled: Vec<f64>,
 }
 
 impl Newton {
@@ -84,6 +89,9 @@ impl Newton {
             rate_factor: CAUTIOUS_RATE,
             last_leading: 0.0,
             delta: vec![0.0; system.n],
+            has_multipliers: system.structure.has_constraints(),
+            is_multiplier: system.structure.is_multiplier.clone(),
+            scaled: Vec::new(),
         }
     }
 
@@ -103,7 +111,13 @@ impl Newton {
         system.linearise(end.time, end.y, end.y_prime, end.leading);
         system.work.factorisations += 1;
         self.leading = None;
-        self.factorisation.factor(&system.jacobian).map_err(|singular| match first_not_finite(&system.jacobian) {
+        self.scaled.clone_from(&system.jacobian);
+        if self.has_multipliers {
+            for (value, &column) in self.scaled.iter_mut().zip(&system.jacobian_columns) {
+                *value *= if self.is_multiplier[column] { end.leading } else { 1.0 };
+            }
+        }
+        self.factorisation.factor(&self.scaled).map_err(|singular| match first_not_finite(&system.jacobian) {
             Some(entry) => {
                 NewtonFailure { cause: FailureCause::NotFinite, component: Some(system.jacobian_rows[entry]) }
             }
@@ -188,6 +202,7 @@ impl Newton {
             return Err(NewtonFailure { cause: FailureCause::NotFinite, component: Some(component) });
         }
         self.factorisation.solve(&mut self.delta);
+        self.scale_multipliers_of_delta();
         let ratio = self.leading.map_or(1.0, |leading| end.leading / leading);
         let factor = -2.0 / (1.0 + ratio);
         self.delta.iter_mut().for_each(|d| *d *= factor);
@@ -249,5 +264,16 @@ impl Newton {
 
     pub fn solve_block(&mut self, right_hand_sides: &mut [f64], width: usize) {
         self.factorisation.solve_block(right_hand_sides, width);
+        if let Some(leading) = self.leading.filter(|_| self.has_multipliers) {
+            let rows = right_hand_sides.chunks_exact_mut(width).zip(&self.is_multiplier);
+            rows.filter(|(_, is)| **is).for_each(|(row, _)| row.iter_mut().for_each(|value| *value *= leading));
+        }
+    }
+
+    fn scale_multipliers_of_delta(&mut self) {
+        if let Some(leading) = self.leading.filter(|_| self.has_multipliers) {
+            let multipliers = self.delta.iter_mut().zip(&self.is_multiplier);
+            multipliers.filter(|(_, is)| **is).for_each(|(value, _)| *value *= leading);
+        }
     }
 }

@@ -1,8 +1,11 @@
 //! How large an error is, measured by the tolerances.
 
+use super::augmented::Augmented;
 use super::problem::{Dynamics, Options};
 
 const GUESS_SHARE: f64 = 0.01;
+/// Keeps the weights of columns that are still zero finite.
+const SMALLEST_COLUMN: f64 = 1e-150;
 
 /// Weights of the error control: component i of the state may err by `relative |y_i| + absolute_i`, the sensitivity of
 /// component i to parameter j by `relative |S_ij| + absolute_i / parameter_scale_j`.
@@ -18,8 +21,11 @@ pub(super) struct ErrorNorm {
     /// 1 / parameter scale; grown from the columns themselves where `adaptive`.
     column_scale: Vec<f64>,
     adaptive: bool,
+    /// Columns that have had an accepted value other than zero.
+    seen: Vec<bool>,
     inverse_scale: Vec<f64>,
     differential: Vec<bool>,
+    is_multiplier: Vec<bool>,
     all_differential: bool,
     inverse_count: f64,
     /// 1 / weight of each element of z.
@@ -38,7 +44,8 @@ pub(super) struct Size {
 
 impl ErrorNorm {
     /// `p`: number of sensitivity columns under control.
-    pub fn new<D: Dynamics + ?Sized>(dynamics: &D, options: &Options, p: usize) -> Self {
+    pub fn new<D: Dynamics + ?Sized>(system: &Augmented<D>, options: &Options, p: usize) -> Self {
+        let dynamics = &*system.dynamics;
         let n = dynamics.dimension();
         let differential = dynamics.differential().to_vec();
         let count = differential.iter().filter(|d| **d).count().max(1);
@@ -56,9 +63,11 @@ impl ErrorNorm {
                 .collect(),
             column_scale,
             adaptive,
+            seen: vec![false; p],
             inverse_scale: dynamics.scale().iter().map(|s| 1.0 / s).collect(),
             all_differential: differential.iter().all(|d| *d),
             differential,
+            is_multiplier: system.structure.is_multiplier.clone(),
             inverse_count: 1.0 / count as f64,
             inverse_weight: vec![0.0; n * (1 + p)],
             columns: vec![0.0; p],
@@ -70,7 +79,7 @@ impl ErrorNorm {
     pub fn guess_column_scale(&mut self, z_prime: &[f64], span: f64) {
         if self.adaptive && self.p > 0 {
             let grown: Vec<f64> = z_prime[self.n..].iter().map(|v| GUESS_SHARE * span * v).collect();
-            self.grow_column_scale(&grown);
+            self.grow_column_scale(&vec![0.0; grown.len()], &grown);
         }
     }
 
@@ -88,7 +97,7 @@ impl ErrorNorm {
     pub fn set_weights_between(&mut self, old: &[f64], new: &[f64]) {
         let n = self.n;
         if self.adaptive && self.p > 0 {
-            self.grow_column_scale(&new[n..]);
+            self.grow_column_scale(&old[n..], &new[n..]);
         }
         for (((w, absolute), a), b) in self.inverse_weight[..n].iter_mut().zip(&self.absolute).zip(old).zip(new) {
             *w = 1.0 / (self.relative * a.abs().max(b.abs()) + absolute);
@@ -105,10 +114,19 @@ impl ErrorNorm {
         }
     }
 
-    fn grow_column_scale(&mut self, s: &[f64]) {
-        for (row, inverse_scale) in s.chunks_exact(self.p).zip(&self.inverse_scale) {
-            for (scale, value) in self.column_scale.iter_mut().zip(row) {
-                *scale = scale.max(value.abs() * inverse_scale).max(f64::MIN_POSITIVE.sqrt());
+    /// Grows the scale of the columns by accepted values. A rejected attempt may be far off, so attempted values count
+    /// only for columns that have been zero so far: their onset has no other measure.
+    fn grow_column_scale(&mut self, accepted: &[f64], attempted: &[f64]) {
+        let rows = accepted.chunks_exact(self.p).zip(attempted.chunks_exact(self.p)).zip(&self.inverse_scale);
+        for ((accepted, attempted), inverse_scale) in rows {
+            let columns = self.column_scale.iter_mut().zip(&mut self.seen);
+            for (((scale, seen), accepted), attempted) in columns.zip(accepted).zip(attempted) {
+                *seen |= *accepted != 0.0;
+                let value = if *seen { accepted } else { attempted };
+                let size = value.abs() * inverse_scale;
+                if size.is_finite() {
+                    *scale = scale.max(size).max(SMALLEST_COLUMN);
+                }
             }
         }
     }
@@ -137,9 +155,12 @@ impl ErrorNorm {
         Size { norm: finite_root(sum * self.inverse_count), component }
     }
 
-    /// Root mean square of all components of a correction of the state, for the convergence of Newton's method.
+    /// Root mean square of a correction of the state, for the convergence of Newton's method. Multipliers of constraints
+    /// do not count: the rounding errors of a step of length h appear in them divided by h (Hairer-Lubich-Roche-1989).
     pub fn of_correction(&self, correction: &[f64]) -> f64 {
-        let sum: f64 = correction[..self.n].iter().zip(&self.inverse_weight).map(|(e, w)| (e * w) * (e * w)).sum();
+        let elements = correction[..self.n].iter().zip(&self.inverse_weight).zip(&self.is_multiplier);
+        let sum: f64 =
+            elements.filter(|(_, is_multiplier)| !**is_multiplier).map(|((e, w), _)| (e * w) * (e * w)).sum();
         finite_root(sum / self.n as f64)
     }
 

@@ -2,7 +2,12 @@
 
 use crate::linear::SparsityPattern;
 
-/// A differential-algebraic system `0 = F(t, y, y'; theta)` of index 0, 1 or (in Gear-Gupta-Leimkuhler form) 2.
+/// A differential-algebraic system `0 = F(t, y, y'; theta)` of index 0, 1 or 2.
+///
+/// Systems of index 2 have Hessenberg form: `x' = f(t, x, w)`, `0 = c(t, x)`, where f may contain further algebraic
+/// components with equations of their own. Mechanisms with loops are brought to it by the method of
+/// Gear-Gupta-Leimkuhler-1985: constraints on position and on velocity level, a multiplier for each. Which equations are
+/// constraints and which components their multipliers is found from the entries of the Jacobian.
 ///
 /// `n` = [`Dynamics::dimension`], `p` = [`Dynamics::parameter_count`]. Methods take `&mut self` so that an implementation may
 /// keep scratch memory. Non-finite results are allowed; the integrator treats them as a failed step.
@@ -74,6 +79,11 @@ pub trait Dynamics {
     /// Name of component `i` in the study's words, for messages.
     fn component_name(&self, i: usize) -> String {
         format!("y[{i}]")
+    }
+
+    /// Name of equation (row of F) `i` in the study's words, for messages: of a constraint, the loop it closes.
+    fn equation_name(&self, i: usize) -> String {
+        format!("equation {i}")
     }
 }
 
@@ -188,6 +198,8 @@ pub struct Failure {
     pub cause: FailureCause,
     /// The component to blame, where one can be named.
     pub component: Option<usize>,
+    /// The equations (rows of F) that contradict or repeat each other, where the cause is such.
+    pub equations: Vec<usize>,
     pub work: Box<Work>,
 }
 
@@ -200,6 +212,8 @@ pub enum FailureCause {
     NotFinite,
     SingularMatrix,
     InconsistentStart,
+    /// Constraints repeat each other: the multipliers (forces) that go with them are not determined.
+    RedundantConstraints,
     NoEquilibrium,
     /// The implicit equations of a step could not be solved however small the step.
     NoConvergence,

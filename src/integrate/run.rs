@@ -12,6 +12,10 @@ use super::stepper::{Limits, Refusal};
 
 const EXPLICIT_NAME: &str = "Runge-Kutta 5(4)";
 const BDF_NAME: &str = "BDF";
+/// Start values may miss a constraint by this multiple of the relative tolerance.
+const START_ACCURACY: f64 = 10.0;
+/// Constraints are differenced with respect to time over this share of a segment.
+const TIME_SHARE: f64 = 1e-6;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Method {
@@ -36,6 +40,8 @@ pub(super) struct Run<'d, 't, D: ?Sized> {
     runge_kutta: RungeKutta,
     bdf: Bdf,
     monitor: Option<Monitor>,
+    has_passed_start: bool,
+    tolerance: f64,
     time: f64,
     z: Vec<f64>,
     z_prime: Vec<f64>,
@@ -45,10 +51,10 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
     /// The request must have been checked.
     pub fn new(dynamics: &'d mut D, start: &Start, times: &'t [f64], options: &Options) -> Self {
         let with_sensitivities = !start.sensitivity.is_empty();
-        let mut system = Augmented::new(dynamics, with_sensitivities, start.time, &start.y);
+        let mut system = Augmented::new(dynamics, with_sensitivities, start.time, &start.y, &start.y_prime);
         let (n, p) = (system.n, system.p);
         let controlled = if options.control_sensitivities { p } else { 0 };
-        let norm = |system: &Augmented<D>| ErrorNorm::new(system.dynamics, options, controlled);
+        let norm = |system: &Augmented<D>| ErrorNorm::new(system, options, controlled);
         let mut z = start.y.clone();
         z.extend((0..n).flat_map(|i| (0..p).map(move |j| start.sensitivity[j * n + i])));
         let mut z_prime = vec![0.0; z.len()];
@@ -65,6 +71,8 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
             bdf: Bdf::new(&system, norm(&system)),
             monitor: (automatic && options.follow_plan.is_none()).then(Monitor::default),
             system,
+            has_passed_start: false,
+            tolerance: options.relative_tolerance,
             time: start.time,
             z,
             z_prime,
@@ -76,9 +84,55 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
         self.method == Method::Bdf || self.system.explicit
     }
 
-    pub fn take_start(&mut self) {
+    /// Completes the start for an integration to `end` and takes the requested times at the start itself.
+    ///
+    /// # Errors
+    ///
+    /// Start values that do not satisfy the constraints.
+    pub fn take_start(&mut self, end: f64) -> Result<(), Refusal> {
+        if self.method == Method::Bdf {
+            self.require_constraints()?;
+            self.make_consistent(end)?;
+        }
         let z = &self.z;
         self.recorder.take_until(self.time, |_, out| out.copy_from_slice(z));
+        Ok(())
+    }
+
+    /// Refuses values that miss a constraint by more than the tolerances allow.
+    fn require_constraints(&mut self) -> Result<(), Refusal> {
+        if !self.system.structure.has_constraints() {
+            return Ok(());
+        }
+        let n = self.system.n;
+        let mut residual = vec![0.0; n];
+        self.system.residual(self.time, &self.z[..n], &self.z_prime[..n], &mut residual);
+        self.system.linearise(self.time, &self.z[..n], &self.z_prime[..n], 0.0);
+        let mut effect = vec![0.0; n];
+        let places = self.system.jacobian_rows.iter().zip(&self.system.jacobian_columns);
+        for ((&row, &column), value) in places.zip(&self.system.jacobian) {
+            effect[row] += value.abs() * (self.system.dynamics.scale()[column] + self.z[column].abs());
+        }
+        let missed = |row: &&usize| residual[**row].abs() > START_ACCURACY * self.tolerance * effect[**row];
+        match self.system.structure.constraints.iter().find(missed) {
+            Some(&row) => Err(Refusal {
+                time: self.time,
+                cause: FailureCause::InconsistentStart,
+                component: None,
+                equation: Some(row),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    fn make_consistent(&mut self, end: f64) -> Result<(), Refusal> {
+        let time_step = TIME_SHARE * (end - self.time).max(f64::MIN_POSITIVE.sqrt());
+        match make_consistent(&mut self.system, self.time, time_step, &mut self.z, &mut self.z_prime) {
+            Consistency::NotFinite(component) => {
+                Err(Refusal { component: Some(component), ..Refusal::new(self.time, FailureCause::NotFinite) })
+            }
+            Consistency::Reached | Consistency::Undetermined => Ok(()),
+        }
     }
 
     /// Integrates to `end` under error control; `discontinuous`: the right-hand side may jump there.
@@ -100,7 +154,7 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
     /// Follows the part of a recorded plan that ends at `end`, starting with its step `next`; returns the step after.
     pub fn follow(&mut self, plan: &Plan, mut next: usize, end: f64, discontinuous: bool) -> Result<usize, Refusal> {
         let method_of = |order: u8| if order == 0 { Method::Explicit } else { Method::Bdf };
-        let run_out = |time| Refusal { time, cause: FailureCause::InvalidRequest, component: None };
+        let run_out = |time| Refusal::new(time, FailureCause::InvalidRequest);
         if let Some(step) = plan.steps.get(next) {
             self.method = method_of(step.order);
         }
@@ -124,13 +178,10 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
 
     fn begin_segment(&mut self, end: f64, discontinuous: bool) -> Result<(), Refusal> {
         self.system.last_time = if discontinuous { end.next_down() } else { f64::INFINITY };
-        if self.method == Method::Bdf {
-            let consistency = make_consistent(&mut self.system, self.time, &mut self.z, &mut self.z_prime);
-            if let Consistency::NotFinite(component) = consistency {
-                let cause = FailureCause::NotFinite;
-                return Err(Refusal { time: self.time, cause, component: Some(component) });
-            }
+        if self.method == Method::Bdf && self.has_passed_start {
+            self.make_consistent(end)?;
         }
+        self.has_passed_start = true;
         self.start_method(end)
     }
 

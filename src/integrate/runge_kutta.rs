@@ -122,7 +122,7 @@ impl RungeKutta {
         let mut rejected = false;
         loop {
             let (step, reaches_end) = limits.fit(self.next_step, self.time, end);
-            limits.check(system, self.time, step, reaches_end, self.trouble)?;
+            limits.check(system, self.time, step, end, self.trouble)?;
             self.attempt(system, step);
             let error = self.measure(step);
             if error.norm <= 1.0 {
@@ -233,7 +233,7 @@ fn component_of<D: Dynamics + ?Sized>(place: usize, system: &Augmented<D>) -> us
 }
 
 fn not_finite<D: Dynamics + ?Sized>(time: f64, place: usize, system: &Augmented<D>) -> Refusal {
-    Refusal { time, cause: FailureCause::NotFinite, component: Some(component_of(place, system)) }
+    Refusal::new(time, FailureCause::NotFinite).blaming(Some(component_of(place, system)))
 }
 
 /// `out = base + h sum_s coefficients[s] stages[s]`

@@ -3,8 +3,10 @@
 use super::augmented::Augmented;
 use super::problem::{Dynamics, Failure, FailureCause, Options, Work};
 
-/// A step smaller than this many units of rounding of the time cannot be resolved.
+/// A step smaller than this share of the time cannot be resolved.
 const SMALLEST_STEP: f64 = 16.0 * f64::EPSILON;
+/// Near time zero the time counts as this share of the end: first steps of stiff systems can be that short.
+const TIME_AT_ZERO: f64 = 1e-25;
 /// The last step before a forced time is stretched by up to this factor rather than leaving a sliver.
 const STRETCH: f64 = 1.01;
 
@@ -14,11 +16,21 @@ pub(super) struct Refusal {
     pub time: f64,
     pub cause: FailureCause,
     pub component: Option<usize>,
+    pub equation: Option<usize>,
 }
 
 impl Refusal {
+    pub fn new(time: f64, cause: FailureCause) -> Self {
+        Self { time, cause, component: None, equation: None }
+    }
+
+    pub fn blaming(self, component: Option<usize>) -> Self {
+        Self { component, ..self }
+    }
+
     pub fn with_work(self, work: Work) -> Failure {
-        Failure { time: self.time, cause: self.cause, component: self.component, work: Box::new(work) }
+        let equations = self.equation.into_iter().collect();
+        Failure { time: self.time, cause: self.cause, component: self.component, equations, work: Box::new(work) }
     }
 }
 
@@ -51,16 +63,16 @@ impl Limits {
         system: &Augmented<D>,
         t: f64,
         step: f64,
-        reaches_end: bool,
+        end: f64,
         trouble: (FailureCause, Option<usize>),
     ) -> Result<(), Refusal> {
         let work = &system.work;
         if work.steps + work.rejected_error + work.rejected_newton >= self.maximum_steps {
-            return Err(Refusal { time: t, cause: FailureCause::TooManySteps, component: trouble.1 });
+            return Err(Refusal::new(t, FailureCause::TooManySteps).blaming(trouble.1));
         }
-        let too_small = step <= SMALLEST_STEP * t.abs().max(f64::MIN_POSITIVE);
-        if !step.is_finite() || (too_small && !reaches_end) {
-            return Err(Refusal { time: t, cause: trouble.0, component: trouble.1 });
+        let too_small = step <= SMALLEST_STEP * t.abs().max(TIME_AT_ZERO * end.abs()) && t + step < end;
+        if !step.is_finite() || too_small {
+            return Err(Refusal::new(t, trouble.0).blaming(trouble.1));
         }
         Ok(())
     }

@@ -59,6 +59,10 @@ impl Failure {
             Cause::InconsistentStart => {
                 ("no consistent start values exist", "the start values contradict each other; give fewer of them")
             }
+            Cause::RedundantConstraints => (
+                "constraints repeat each other, so that the forces in them are not determined",
+                "a loop is closed by more joints than it needs: free one of their directions, or make a body elastic",
+            ),
             Cause::NoEquilibrium => (
                 "no equilibrium was found",
                 "a body that can move without any restoring force has no equilibrium: use `start = rest { .. }` with values",

@@ -5,7 +5,7 @@ use super::prepare::Record;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::Symbol;
 use crate::integrate::{self, Dynamics, MethodChoice, Options, Solution, Start, Work};
-use crate::mechanics::{self, System};
+use crate::mechanics::{self, System, Variable, VariableKind};
 use crate::study::{Method, Parameter, Study};
 use crate::tape::{Bound, Model};
 
@@ -118,7 +118,7 @@ fn run(
     bound.set_parameter_scale(compiled.study.parameters.iter().map(Parameter::scale).collect());
     let name = |i: usize| compiled.model.variables()[i].name.clone();
     let blame = |failure: integrate::Failure| Failure::from_integration(&record.name, &failure, name);
-    let start = start(&mut bound, record, with_gradient).map_err(blame)?;
+    let start = start(compiled, &mut bound, record, with_gradient).map_err(blame)?;
     let options = options(&compiled.study);
     let solution =
         integrate::integrate(&mut bound, &start, &record.times, &record.breakpoints, &options).map_err(blame)?;
@@ -137,7 +137,12 @@ fn run(
     Ok(Trajectory { channels, gradient: gradients, probes, work: solution.work })
 }
 
-fn start(bound: &mut Bound, record: &Record, with_gradient: bool) -> Result<Start, integrate::Failure> {
+fn start(
+    compiled: &Compiled,
+    bound: &mut Bound,
+    record: &Record,
+    with_gradient: bool,
+) -> Result<Start, integrate::Failure> {
     let t0 = record.start_time();
     let given = bound.start_values(record.experiment, t0);
     let (mut y, mut sensitivity) = (given.values, given.derivatives);
@@ -149,9 +154,22 @@ fn start(bound: &mut Bound, record: &Record, with_gradient: bool) -> Result<Star
     if !with_gradient {
         sensitivity.clear();
     }
+    if bound.differential().contains(&false) {
+        return integrate::consistent_start(bound, t0, &y, &sensitivity, &stated(compiled, record.experiment));
+    }
     let mut y_prime = vec![0.0; y.len()];
     bound.explicit_rates(t0, &y, &mut y_prime);
     Ok(Start { time: t0, y, y_prime, sensitivity })
+}
+
+/// Variables whose start values are stated: by the experiment, or by a law for its states. Those of the reference
+/// configuration at rest are where the mechanism starts from to close its loops.
+fn stated(compiled: &Compiled, experiment: usize) -> Vec<bool> {
+    let overrides = compiled.study.experiments.get(experiment).map_or(&[][..], |e| &e.start.overrides[..]);
+    let is_stated = |variable: &Variable| {
+        variable.kind == VariableKind::Law || overrides.iter().any(|(symbol, _)| *symbol == variable.symbol)
+    };
+    compiled.system.states.iter().map(is_stated).chain(compiled.system.algebraic.iter().map(|_| false)).collect()
 }
 
 fn options(study: &Study) -> Options {

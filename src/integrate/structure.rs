@@ -1,0 +1,74 @@
+//! Which equations of a semi-explicit system are constraints on the differential components, and which algebraic
+//! components are their multipliers: found from the entries of the Jacobian, so that a model need not declare it.
+
+use super::problem::Dynamics;
+
+/// Shift, in typical magnitudes, to a second point: entries that vanish at the first one by chance show there.
+const SHIFT: f64 = 0.0137;
+
+/// In a Hessenberg system of index 2 (`x' = f(t, x, w)`, `0 = c(t, x)`) the rows `c` and the components `w`; both empty
+/// in systems of index 0 and 1 (Brenan-Campbell-Petzold-1996, 2.2).
+#[derive(Clone, Debug, Default)]
+pub(super) struct Structure {
+    /// Rows that hold neither derivatives nor algebraic components, length n.
+    pub is_constraint: Vec<bool>,
+    /// Those rows, ascending.
+    pub constraints: Vec<usize>,
+    /// Algebraic components that stand in no algebraic equation, length n.
+    pub is_multiplier: Vec<bool>,
+}
+
+impl Structure {
+    pub fn new<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64], y_prime: &[f64]) -> Self {
+        let n = y.len();
+        let mut structure = Self { is_constraint: vec![false; n], constraints: vec![], is_multiplier: vec![false; n] };
+        let differential = dynamics.differential().to_vec();
+        if differential.iter().all(|d| *d) {
+            return structure;
+        }
+        let (by_y, by_derivative) = entries(dynamics, t, y, y_prime);
+        let mut has_derivative = vec![false; n];
+        by_derivative.iter().for_each(|&(row, _)| has_derivative[row] = true);
+        let mut has_algebraic = vec![false; n];
+        let mut in_algebraic_equation = vec![false; n];
+        for &(row, column) in by_y.iter().filter(|(_, column)| !differential[*column]) {
+            has_algebraic[row] = true;
+            in_algebraic_equation[column] |= !has_derivative[row];
+        }
+        structure.is_constraint = (0..n).map(|row| !has_derivative[row] && !has_algebraic[row]).collect();
+        structure.constraints = (0..n).filter(|&row| structure.is_constraint[row]).collect();
+        if !structure.constraints.is_empty() {
+            structure.is_multiplier = (0..n).map(|i| !differential[i] && !in_algebraic_equation[i]).collect();
+        }
+        structure
+    }
+
+    pub fn has_constraints(&self) -> bool {
+        !self.constraints.is_empty()
+    }
+}
+
+type Places = Vec<(usize, usize)>;
+
+/// Places of the entries of dF/dy and of dF/dy' that differ from zero at or near a point.
+pub(super) fn entries<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64], y_prime: &[f64]) -> (Places, Places) {
+    let shifted: Vec<f64> = y
+        .iter()
+        .zip(dynamics.scale())
+        .enumerate()
+        .map(|(i, (y, scale))| y + SHIFT * scale * (1.0 + (i % 7) as f64 / 7.0))
+        .collect();
+    let places: Places = dynamics.pattern().entries().collect();
+    let (mut by_y, mut by_derivative) = (Vec::new(), Vec::new());
+    let (mut values, mut both) = (vec![0.0; places.len()], vec![0.0; places.len()]);
+    for point in [y, &shifted] {
+        dynamics.jacobian(t, point, y_prime, 0.0, &mut values);
+        // Large against dF/dy, so that no entry is lost in rounding.
+        let c = values.iter().filter(|v| v.is_finite()).fold(1.0f64, |a, v| a.max(v.abs()));
+        dynamics.jacobian(t, point, y_prime, c, &mut both);
+        by_y.extend(places.iter().zip(&values).filter(|(_, v)| **v != 0.0).map(|(place, _)| *place));
+        let differing = places.iter().zip(values.iter().zip(&both)).filter(|(_, (a, b))| a != b);
+        by_derivative.extend(differing.map(|(place, _)| *place));
+    }
+    (by_y, by_derivative)
+}
