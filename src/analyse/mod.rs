@@ -1,1 +1,13 @@
-//! (contract follows)
+//! What an identified model is good for.
+//!
+//! *In*: a compiled study with manoeuvres and criteria, an estimate with its covariance. *Out*: per criterion its value,
+//! interval and verdict ([`Validity`]). *Must not happen here*: fits, files, text for a terminal.
+
+mod criterion;
+mod increments;
+mod monte_carlo;
+mod validity;
+
+pub use criterion::{CriterionValues, evaluate};
+pub use monte_carlo::MonteCarlo;
+pub use validity::*;

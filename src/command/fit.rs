@@ -4,9 +4,9 @@ use super::output::write_whole;
 use super::session::Session;
 use super::{Failed, Format, StudyArguments};
 use crate::fit::Control;
-use crate::identify::{Identification, Settings, fit, identification};
+use crate::identify::{Fitted, Identification, Settings, fit, identification};
 use crate::report;
-use crate::simulation::Record;
+use crate::simulation::{Compiled, Record};
 use crate::study::Role;
 use std::path::PathBuf;
 
@@ -40,6 +40,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
 
 /// Fits one variant to its estimation records and reports it on all records.
 pub(super) fn identify(session: &Session, study: &StudyArguments, variant: &str) -> Result<Identification, Failed> {
+    let fit = fit_variant(session, study, variant)?;
+    Ok(identification(&fit.compiled, &fit.fitted, &fit.records.iter().collect::<Vec<_>>()))
+}
+
+/// A variant fitted to its estimation records.
+pub(super) struct FittedVariant {
+    pub compiled: Compiled,
+    /// All records, held-out ones included.
+    pub records: Vec<Record>,
+    pub fitted: Fitted,
+}
+
+pub(super) fn fit_variant(session: &Session, study: &StudyArguments, variant: &str) -> Result<FittedVariant, Failed> {
     let compiled = session.compile(variant)?;
     let records = session.records(&compiled.study, study)?;
     let estimation: Vec<&Record> = records.iter().filter(|record| record.role == Role::Estimation).collect();
@@ -51,5 +64,5 @@ pub(super) fn identify(session: &Session, study: &StudyArguments, variant: &str)
         Control::Continue
     })
     .map_err(|diagnostic| session.fail(&[diagnostic]))?;
-    Ok(identification(&compiled, &fitted, &records.iter().collect::<Vec<_>>()))
+    Ok(FittedVariant { compiled, records, fitted })
 }

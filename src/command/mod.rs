@@ -13,6 +13,7 @@ mod output;
 mod progress;
 mod session;
 mod simulate;
+mod validate;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -40,6 +41,8 @@ enum Command {
     Diagnose(diagnose::Arguments),
     /// Fit all variants and show them side by side, on estimation and held-out data
     Compare(compare::Arguments),
+    /// Judge what the identified model is good for: criteria with confidence
+    Validate(validate::Arguments),
     /// Explain a diagnostic code
     Explain(explain::Arguments),
 }
@@ -89,6 +92,7 @@ pub fn run() -> ExitCode {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Validate(arguments) => validate::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
     };
     match outcome {

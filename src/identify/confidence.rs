@@ -29,6 +29,8 @@ pub struct Confidence {
     pub effective_count: f64,
     /// Bayesian information criterion with unknown variances per channel (Schwarz-1978).
     pub bic: f64,
+    /// Directions of infinite variance: orthonormal in parameters scaled by [`Parameter::scale`].
+    pub directions: Vec<Vec<f64>>,
     standard_deviations: Vec<Option<f64>>,
     estimate: Vec<f64>,
 }
@@ -41,8 +43,12 @@ impl Confidence {
 
     /// 95 % interval; `None` where the data leave the parameter undetermined.
     pub fn interval(&self, index: usize) -> Option<(f64, f64)> {
-        let freedom = (self.effective_count - self.estimate.len() as f64).max(1.0);
-        Some(confidence_interval(self.estimate[index], self.standard_deviation(index)?, freedom, LEVEL))
+        Some(confidence_interval(self.estimate[index], self.standard_deviation(index)?, self.freedom(), LEVEL))
+    }
+
+    /// Degrees of freedom of the noise estimate behind the intervals.
+    pub fn freedom(&self) -> f64 {
+        (self.effective_count - self.estimate.len() as f64).max(1.0)
     }
 }
 
@@ -82,6 +88,7 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     if let Ok(covariance) = Covariance::new(&gradient, &scales, 1.0, Some(&gamma), RANK_THRESHOLD) {
         confidence.correlation = covariance.correlation().chunks(count).map(<[f64]>::to_vec).collect();
         confidence.standard_deviations.clone_from(&covariance.standard_deviations);
+        confidence.directions = covariance.undetermined;
         confidence.covariance = covariance.matrix;
     }
     confidence

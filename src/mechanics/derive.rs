@@ -262,11 +262,10 @@ fn assemble(
     let derivatives: Vec<Node> = study.states.iter().map(|state| state.derivative).collect();
     rates.extend(graph.substitute(&derivatives, meaning));
 
-    let values: Vec<Node> = study.measures.iter().map(|measure| measure.value).collect();
+    let values: Vec<Node> = study.outputs().map(|(_, value, _)| value).collect();
     let values = graph.substitute(&values, meaning);
-    let name_and_value =
-        |(measure, value): (&crate::study::Measure, Node)| Output { name: measure.name.clone(), value };
-    let outputs: Vec<Output> = study.measures.iter().zip(values).map(name_and_value).collect();
+    let name_and_value = |((name, ..), value): ((&str, Node, Span), Node)| Output { name: name.to_owned(), value };
+    let outputs: Vec<Output> = study.outputs().zip(values).map(name_and_value).collect();
     let probes = probes(&mut graph, study, meaning);
     let starts = all_starts(&mut graph, study, &states, meaning)?;
 
@@ -337,12 +336,11 @@ fn all_starts(
     let initial: HashMap<Symbol, Node> = study.states.iter().map(|state| state.symbol).zip(initial).collect();
     let mut result = Vec::new();
     let mut errors = Vec::new();
-    for experiment in &study.experiments {
-        let values: Vec<Node> = experiment.start.overrides.iter().map(|&(_, value)| value).collect();
+    for (name, start, span) in study.starts() {
+        let values: Vec<Node> = start.overrides.iter().map(|&(_, value)| value).collect();
         let values = graph.substitute(&values, meaning);
-        let overrides: Vec<(Symbol, Node)> =
-            experiment.start.overrides.iter().map(|&(symbol, _)| symbol).zip(values).collect();
-        match starts(graph, states, experiment, &initial, &overrides) {
+        let overrides: Vec<(Symbol, Node)> = start.overrides.iter().map(|&(symbol, _)| symbol).zip(values).collect();
+        match starts(graph, states, (&name, start.base, span), &initial, &overrides) {
             Ok(equations) => result.push(equations),
             Err(found) => errors.extend(found),
         }
@@ -371,13 +369,15 @@ fn refuse_unknown_symbols(study: &Study, system: &System) -> Result<(), Vec<Diag
     for ((state, &rate), span) in system.states.iter().zip(&system.rates).zip(spans) {
         check(&format!("the rate of `{}`", state.name), rate, span);
     }
-    for (output, measure) in system.outputs.iter().zip(&study.measures) {
-        check(&format!("measure `{}`", output.name), output.value, measure.span);
+    let measured: Vec<&str> = study.measures.iter().map(|measure| measure.name.as_str()).collect();
+    for (output, (name, _, span)) in system.outputs.iter().zip(study.outputs()) {
+        let what = if measured.contains(&name) { "measure" } else { "criterion" };
+        check(&format!("{what} `{name}`"), output.value, span);
     }
-    for (equations, experiment) in system.starts.iter().zip(&study.experiments) {
+    for (equations, (_, _, span)) in system.starts.iter().zip(study.starts()) {
         for (state, equation) in system.states.iter().zip(equations) {
             if let StartEquation::Value(node) = equation {
-                check(&format!("the start value of `{}`", state.name), *node, experiment.span);
+                check(&format!("the start value of `{}`", state.name), *node, span);
             }
         }
     }

@@ -108,15 +108,21 @@ pub fn emit_model(study: &Study, system: &System) -> String {
     for measure in &study.measures {
         let _ = writeln!(text, "measure {} [{}] = {}", measure.name, measure.unit.symbol, printer.text(measure.value));
     }
-    for experiment in &study.experiments {
-        let base = match experiment.start.base {
+    for (owner, start, _) in study.starts() {
+        let base = match start.base {
             StartBase::Equilibrium => "equilibrium",
             StartBase::Rest => "rest",
         };
-        let _ = writeln!(text, "experiment {} from {base}", experiment.name);
-        for &(symbol, value) in &experiment.start.overrides {
+        let _ = writeln!(text, "{} from {base}", owner.replace('`', ""));
+        for &(symbol, value) in &start.overrides {
             let _ = writeln!(text, "  {} = {}", study.graph.symbol_name(symbol), printer.text(value));
         }
+    }
+    for criterion in &study.criteria {
+        let (statistic, value) = (criterion.statistic.name(), printer.text(criterion.value));
+        let manoeuvre = study.manoeuvres.get(criterion.manoeuvre).map_or("", |manoeuvre| &manoeuvre.name);
+        let unit = &criterion.unit.symbol;
+        let _ = writeln!(text, "criterion {} [{unit}] = {statistic}({value}) in {manoeuvre}", criterion.name);
     }
     let _ = writeln!(
         text,
@@ -198,8 +204,9 @@ pub fn emit_equations(study: &Study, system: &System) -> String {
         let _ = writeln!(text, "  {} = {}", output.name, printer.text(output.value));
     }
     let plain = Printer::plain(&system.graph, &inputs);
-    for (equations, experiment) in system.starts.iter().zip(&study.experiments) {
-        let _ = writeln!(text, "\nstart {}", experiment.name);
+    for (equations, (owner, ..)) in system.starts.iter().zip(study.starts()) {
+        let name = owner.split('`').nth(1).unwrap_or_default();
+        let _ = writeln!(text, "\nstart {name}");
         for (state, equation) in system.states.iter().zip(equations) {
             let value = match equation {
                 StartEquation::Value(node) => plain.text(*node),

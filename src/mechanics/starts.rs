@@ -1,18 +1,18 @@
 //! How every experiment starts.
 
 use super::system::{StartEquation, Variable, VariableKind};
-use crate::diagnostics::{Code, Diagnostic};
+use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::expression::{Graph, Node, Symbol};
-use crate::study::{Experiment, StartBase};
+use crate::study::StartBase;
 use std::collections::HashMap;
 
-/// Start of every state of one experiment, free of other states.
+/// Start of every state of one experiment or manoeuvre (what it is, its base, its place), free of other states.
 ///
 /// `initial` holds the law states' declared start values with kinematic symbols already replaced.
 pub(super) fn starts(
     graph: &mut Graph,
     states: &[Variable],
-    experiment: &Experiment,
+    (owner, base, span): (&str, StartBase, Span),
     initial: &HashMap<Symbol, Node>,
     overrides: &[(Symbol, Node)],
 ) -> Result<Vec<StartEquation>, Vec<Diagnostic>> {
@@ -21,7 +21,7 @@ pub(super) fn starts(
         .iter()
         .map(|state| {
             let stated = overrides.iter().rev().find(|(symbol, _)| *symbol == state.symbol).map(|&(_, node)| node);
-            stated.or(match (experiment.start.base, state.kind) {
+            stated.or(match (base, state.kind) {
                 (StartBase::Equilibrium, _) => None,
                 (StartBase::Rest, VariableKind::Law) => Some(initial.get(&state.symbol).copied().unwrap_or(zero)),
                 (StartBase::Rest, _) => Some(zero),
@@ -35,12 +35,12 @@ pub(super) fn starts(
         let unknown = graph.symbols_of(&[*value]);
         if let Some(other) = states.iter().find(|other| unknown.contains(&other.symbol)) {
             let message = format!(
-                "the start value of `{}` in experiment `{}` depends on `{}`, which is not known at the start",
-                state.name, experiment.name, other.name
+                "the start value of `{}` in {owner} depends on `{}`, which is not known at the start",
+                state.name, other.name
             );
             errors.push(
                 Diagnostic::error(Code::UNKNOWN_START, message)
-                    .label(experiment.span, "started here")
+                    .label(span, "started here")
                     .help(format!("give `{}` a start value by parameters and numbers only", state.name)),
             );
         }

@@ -18,12 +18,12 @@ pub struct System {
     pub constraints: Vec<Node>,
     pub parameters: Vec<Symbol>,
     pub parameter_names: Vec<String>,
-    /// One per measure of the study, in the study's order.
+    /// One per output of the study ([`crate::study::Study::outputs`]), in its order: measures, then criteria.
     pub outputs: Vec<Output>,
     /// Further quantities that can be evaluated along a solution: place probes in the study's order of
     /// `places[..].probes[..]`, flattened.
     pub probes: Vec<Output>,
-    /// Per experiment: start value of each state as far as given (see [`StartEquation`]), in state order.
+    /// Per experiment, then per manoeuvre: start value of each state as far as given (see [`StartEquation`]), in state order.
     pub starts: Vec<Vec<StartEquation>>,
 }
 

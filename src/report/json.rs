@@ -3,17 +3,19 @@
 //! The schema's text lies in `docs/schema/`; it is generated from the types and their documentation, and a test keeps
 //! both equal.
 
+use crate::analyse::Validity;
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 use schemars::{JsonSchema, Schema, generate::SchemaSettings, transform::Transform};
 use serde::Serialize;
 use serde_json::Value;
 
-/// Name and version of the three forms of output. The number grows when a field changes its meaning or disappears; new
+/// Name and version of the forms of output. The number grows when a field changes its meaning or disappears; new
 /// fields may appear under the same number.
 pub const DIAGNOSIS: &str = "ident.diagnosis/1";
 pub const IDENTIFICATION: &str = "ident.identification/1";
 pub const COMPARISON: &str = "ident.comparison/1";
+pub const VALIDITY: &str = "ident.validity/1";
 
 /// Result of `ident diagnose`.
 pub fn answer(answer: &Answer) -> Result<String, serde_json::Error> {
@@ -30,12 +32,18 @@ pub fn comparison(variants: &[Identification]) -> Result<String, serde_json::Err
     envelope(COMPARISON, variants)
 }
 
+/// Result of `ident validate`.
+pub fn validity(validity: &Validity) -> Result<String, serde_json::Error> {
+    envelope(VALIDITY, validity)
+}
+
 /// The JSON Schemas by name of output, ready to be written to `docs/schema/`.
 pub fn schemas() -> Vec<(&'static str, Value)> {
     vec![
         (DIAGNOSIS, schema::<Answer>(DIAGNOSIS)),
         (IDENTIFICATION, schema::<Identification>(IDENTIFICATION)),
         (COMPARISON, schema::<Vec<Identification>>(COMPARISON)),
+        (VALIDITY, schema::<Validity>(VALIDITY)),
     ]
 }
 

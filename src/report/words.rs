@@ -1,5 +1,6 @@
 //! Wording shared by all forms of a report.
 
+use crate::analyse::{self, CriterionValidity, Demand};
 use crate::diagnose::{Answer, Candidate, Refit, Step, Verdict};
 use crate::identify::{Identification, RecordFit};
 use crate::report::number;
@@ -88,4 +89,24 @@ pub fn relative_change(before: f64, after: f64) -> Option<f64> {
 /// The command that writes the extension into the study's folder.
 pub fn next_step(answer: &Answer) -> Option<String> {
     answer.extension.as_ref().map(|_| format!("ident diagnose {} --write", answer.study))
+}
+
+/// The verdict on a criterion in words.
+pub fn validity(criterion: &CriterionValidity) -> &'static str {
+    match (criterion.verdict, criterion.demand) {
+        (analyse::Verdict::Valid, Demand::Met) => "VALID: the demand is met",
+        (analyse::Verdict::Valid, Demand::Violated) => "VALID: the demand is violated",
+        (analyse::Verdict::Valid, _) => "VALID",
+        (analyse::Verdict::NotValid, _) => "NOT VALID",
+        (analyse::Verdict::CannotBeJudged, _) => "CANNOT BE JUDGED",
+    }
+}
+
+/// ANSI colour of the verdict on a criterion.
+pub fn validity_colour(criterion: &CriterionValidity) -> &'static str {
+    match (criterion.verdict, criterion.demand) {
+        (analyse::Verdict::Valid, Demand::Violated) | (analyse::Verdict::NotValid, _) => "1;31",
+        (analyse::Verdict::Valid, _) => "1;32",
+        (analyse::Verdict::CannotBeJudged, _) => "1;33",
+    }
 }

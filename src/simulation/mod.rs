@@ -5,9 +5,13 @@
 //! about parameters.
 
 mod failure;
+mod inputs;
+mod manoeuvre;
 mod prepare;
 mod run;
 
 pub use failure::Failure;
-pub use prepare::{Record, RecordInputs, prepare};
+pub use inputs::RecordInputs;
+pub use manoeuvre::manoeuvre;
+pub use prepare::{Record, prepare};
 pub use run::{Compiled, Gradient, Trajectory, probe, simulate};

@@ -1,9 +1,9 @@
 //! Records: measured data of an experiment bound to the study's inputs and measures.
 
+use super::inputs::{Channel, RecordInputs};
 use crate::diagnostics::{Code, Diagnostic, similar_name};
 use crate::signal::{Butterworth, Interpolant, LowPass, Passes, Prefilter, Sampling, Table, read_table};
 use crate::study::{Experiment, Interpolation, Role, Study};
-use crate::tape::InputSource;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ const MINIMUM_SAMPLES: usize = 20;
 /// One experiment's data, ready to simulate and compare. All values SI.
 #[derive(Clone, Debug)]
 pub struct Record {
-    /// Index into the study's experiments.
+    /// Index into the study's experiments; beyond them, into its manoeuvres.
     pub experiment: usize,
     pub name: String,
     pub role: Role,
@@ -25,23 +25,11 @@ pub struct Record {
     pub times: Vec<f64>,
     /// Index of the first compared sample in `times`.
     pub first: usize,
-    /// Indices of the study's measures compared here.
+    /// Indices of the study's measures compared here (of its outputs in general).
     pub measures: Vec<usize>,
     /// Per compared measure: its samples from `times[first]` on.
     pub measured: Vec<Vec<f64>>,
-    sampling: Sampling,
-}
-
-/// The interpolated inputs of a record, by index of the study's inputs.
-#[derive(Clone, Debug)]
-pub struct RecordInputs {
-    interpolants: Vec<Interpolant>,
-}
-
-impl InputSource for RecordInputs {
-    fn sample(&self, input: u32, order: u8, t: f64) -> f64 {
-        self.interpolants[input as usize].evaluate(t, usize::from(order))
-    }
+    pub(super) sampling: Sampling,
 }
 
 impl Record {
@@ -176,7 +164,7 @@ fn record(
         name: experiment.name.clone(),
         role: experiment.role,
         file: path,
-        inputs: RecordInputs { interpolants: inputs },
+        inputs: RecordInputs { channels: inputs.into_iter().map(Channel::Sampled).collect() },
         breakpoints,
         times,
         first: rows.start,

@@ -54,7 +54,7 @@ fn parameters_without_influence(study: &Study, model: &Model) -> Vec<Diagnostic>
         .parameters
         .iter()
         .zip(model.parameter_reach())
-        .filter(|(_, reach)| !reach.contains(&true))
+        .filter(|(_, reach)| !reach[..study.measures.len()].contains(&true))
         .map(|(parameter, _)| {
             Diagnostic::error(
                 Code::NO_INFLUENCE,
@@ -130,7 +130,7 @@ fn run(
             time: record.times.last().copied().unwrap_or(start.time),
             cause: "a measured quantity became infinite or not a number".to_owned(),
             component: None,
-            help: "a measure divides by zero or takes the root of a negative number".to_owned(),
+            help: "a measure or criterion divides by zero or takes the root of a negative number".to_owned(),
         });
     }
     let probes = if with_probes { probes(&mut bound, record, &solution) } else { Vec::new() };

@@ -212,6 +212,12 @@ fn one_combination(
     if logarithmic[0] != 0.0 && equal(&logarithmic, &|weight| weight * logarithmic[0].signum()) {
         return format!("only the product `{}` is determined", joined(" * "));
     }
+    // d of a sum of reciprocals: weights times squared values are equal.
+    let reciprocal: Vec<f64> = logarithmic.iter().zip(parameters).map(|(weight, &j)| weight * values[j]).collect();
+    if reciprocal[0] != 0.0 && equal(&reciprocal, &|weight| weight * reciprocal[0].signum()) {
+        let terms = parameters.iter().map(|&j| format!("1/{}", label(j))).collect::<Vec<_>>().join(" + ");
+        return format!("only the series `1/({terms})` is determined");
+    }
     if pair && logarithmic[0] != 0.0 && equal(&logarithmic, &f64::abs) {
         return format!("only the ratio `{}` is determined", joined(" / "));
     }

@@ -12,6 +12,7 @@ mod covariance;
 mod identifiability;
 mod matrix;
 mod noise;
+mod random;
 mod significance;
 
 pub use angles::principal_angles;
@@ -21,4 +22,5 @@ pub use comparison::{BlockComparison, aicc, bic, compare_blocks};
 pub use covariance::{Covariance, confidence_interval, filtered_noise_gamma, stationary_noise_gamma};
 pub use identifiability::{Identifiability, Undetermined, identifiability};
 pub use noise::{NoiseChannel, noise_variance, noise_variances};
+pub use random::{NormalStream, covariance_root};
 pub use significance::{chi_square_p, f_test_p, likelihood_ratio_p, mixture_p, normal_quantile, student_quantile};

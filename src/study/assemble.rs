@@ -26,6 +26,8 @@ impl<'a> Checker<'a> {
         self.check_all_fields();
         self.states = self.finished_states();
         let experiments = self.finished_experiments();
+        let manoeuvres = self.finished_manoeuvres();
+        let criteria = self.finished_criteria();
         let (filter, remove_mean) = self.finished_filter();
         let solver = self.finished_solver();
         let groups = self.finished_groups();
@@ -58,6 +60,8 @@ impl<'a> Checker<'a> {
             point_quantities: std::mem::take(&mut self.point_quantities),
             groups,
             experiments,
+            manoeuvres,
+            criteria,
             filter,
             remove_mean,
             solver,

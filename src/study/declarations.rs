@@ -26,6 +26,8 @@ pub(super) struct Declarations<'a> {
     pub measures: Vec<Measure<'a>>,
     pub groups: Vec<(&'a Name, &'a [Name])>,
     pub experiments: Vec<Experiment<'a>>,
+    pub manoeuvres: Vec<Manoeuvre<'a>>,
+    pub criteria: Vec<Criterion<'a>>,
     pub identify: Vec<Identified<'a>>,
     pub filter: Option<(Option<&'a Lowpass>, bool, Span)>,
     pub solver: Option<&'a [Field]>,
@@ -94,6 +96,22 @@ pub(super) struct Measure<'a> {
 pub(super) struct Experiment<'a> {
     pub name: &'a Name,
     pub role: Option<&'a Name>,
+    pub fields: &'a [Field],
+}
+
+pub(super) struct Manoeuvre<'a> {
+    pub name: &'a Name,
+    pub title: Option<&'a Name>,
+    pub durations: &'a [Expression],
+    pub fields: &'a [Field],
+}
+
+pub(super) struct Criterion<'a> {
+    pub name: &'a Name,
+    pub unit: Option<&'a Name>,
+    pub title: Option<&'a Name>,
+    pub value: &'a Expression,
+    pub manoeuvre: &'a Name,
     pub fields: &'a [Field],
 }
 
@@ -332,7 +350,9 @@ fn declared_name(kind: &ItemKind) -> Option<&Name> {
         | ItemKind::Formula { name, .. }
         | ItemKind::Measure { name, .. }
         | ItemKind::Group { name, .. }
-        | ItemKind::Experiment { name, .. } => Some(name),
+        | ItemKind::Experiment { name, .. }
+        | ItemKind::Manoeuvre { name, .. }
+        | ItemKind::Criterion { name, .. } => Some(name),
         _ => None,
     }
 }
@@ -373,6 +393,13 @@ fn sort<'a>(result: &mut Declarations<'a>, item: &'a Item, by_variant: bool, dia
         ItemKind::Group { name, members } => result.groups.push((name, members)),
         ItemKind::Experiment { name, role, fields } => {
             result.experiments.push(Experiment { name, role: role.as_ref(), fields });
+        }
+        ItemKind::Manoeuvre { name, title, durations, fields } => {
+            result.manoeuvres.push(Manoeuvre { name, title: title.as_ref(), durations, fields });
+        }
+        ItemKind::Criterion { name, unit, title, value, manoeuvre, fields } => {
+            let (unit, title) = (unit.as_ref(), title.as_ref());
+            result.criteria.push(Criterion { name, unit, title, value, manoeuvre, fields });
         }
         ItemKind::Identify { lines } => add_identified(result, lines, by_variant, diagnostics),
         ItemKind::Filter { lowpass, remove_mean } => {
@@ -420,7 +447,8 @@ fn add_identified<'a>(
     }
 }
 
-/// Everything that an expression can name shares one namespace; groups and experiments have their own.
+/// Everything that an expression can name shares one namespace; groups, experiments with manoeuvres, and
+/// criteria have their own.
 fn check_duplicates(result: &Declarations<'_>, diagnostics: &mut Vec<Diagnostic>) {
     let mut values: Namespace<'_> = BTreeMap::new();
     let constants = result.constants.iter().map(|constant| ("constant", constant.name));
@@ -442,5 +470,12 @@ fn check_duplicates(result: &Declarations<'_>, diagnostics: &mut Vec<Diagnostic>
     let mut experiments: Namespace<'_> = BTreeMap::new();
     for experiment in &result.experiments {
         declare(&mut experiments, "experiment", experiment.name, diagnostics);
+    }
+    for manoeuvre in &result.manoeuvres {
+        declare(&mut experiments, "manoeuvre", manoeuvre.name, diagnostics);
+    }
+    let mut criteria: Namespace<'_> = BTreeMap::new();
+    for criterion in &result.criteria {
+        declare(&mut criteria, "criterion", criterion.name, diagnostics);
     }
 }

@@ -189,7 +189,7 @@ impl<'a> Checker<'a> {
         Some((begin, end))
     }
 
-    fn start(&mut self, field: &'a Field) -> Option<Start> {
+    pub(super) fn start(&mut self, field: &'a Field) -> Option<Start> {
         let word = self.field_word(field, &["equilibrium", "rest"])?;
         let base = if word == "rest" { StartBase::Rest } else { StartBase::Equilibrium };
         let mut overrides = Vec::new();

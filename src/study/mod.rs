@@ -20,6 +20,7 @@ mod identify;
 mod instance;
 mod kinds;
 mod load;
+mod manoeuvres;
 mod model;
 mod names;
 mod paths;

@@ -34,6 +34,10 @@ pub struct Study {
     /// The tree of channel groups; the root is called `total`.
     pub groups: Group,
     pub experiments: Vec<Experiment>,
+    /// Uses of the model that were not measured.
+    pub manoeuvres: Vec<Manoeuvre>,
+    /// What the model is to predict in them.
+    pub criteria: Vec<Criterion>,
     pub filter: Option<Filter>,
     pub remove_mean: bool,
     pub solver: Solver,
@@ -279,6 +283,80 @@ pub struct Experiment {
     pub start: Start,
     pub span: Span,
     pub data_span: Span,
+}
+
+/// A simulation without data: inputs as formulas of time.
+#[derive(Clone, Debug)]
+pub struct Manoeuvre {
+    pub name: String,
+    pub title: String,
+    /// One per input of the study: of time and numbers only.
+    pub inputs: Vec<Node>,
+    /// s; the simulation starts at time zero.
+    pub duration: f64,
+    /// Interval of the instants at which criteria look at it, s.
+    pub step: f64,
+    pub start: Start,
+    pub span: Span,
+}
+
+/// A scalar of a manoeuvre, and what is demanded of it.
+#[derive(Clone, Debug)]
+pub struct Criterion {
+    pub name: String,
+    pub title: String,
+    pub unit: Unit,
+    pub statistic: Statistic,
+    /// The quantity over time; like a measure.
+    pub value: Node,
+    /// Index into [`Study::manoeuvres`].
+    pub manoeuvre: usize,
+    pub below: Option<f64>,
+    pub above: Option<f64>,
+    /// Largest half-width of its confidence interval that is acceptable.
+    pub within: Option<f64>,
+    /// At which the demand must hold, e.g. 0.95.
+    pub confidence: f64,
+    pub span: Span,
+}
+
+/// From a history to a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Statistic {
+    Minimum,
+    Maximum,
+    RootMeanSquare,
+    Mean,
+    Final,
+}
+
+impl Statistic {
+    pub const NAMES: [(&str, Statistic); 5] = [
+        ("min", Statistic::Minimum),
+        ("max", Statistic::Maximum),
+        ("rms", Statistic::RootMeanSquare),
+        ("mean", Statistic::Mean),
+        ("final", Statistic::Final),
+    ];
+
+    /// As written in the study.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, statistic)| *statistic == self).map_or("", |(name, _)| name)
+    }
+}
+
+impl Study {
+    /// How simulations start, experiments first, then manoeuvres: (what it is, start, place). Simulations refer to this order.
+    pub fn starts(&self) -> impl Iterator<Item = (String, &Start, Span)> {
+        let experiments = self.experiments.iter().map(|e| (format!("experiment `{}`", e.name), &e.start, e.span));
+        experiments.chain(self.manoeuvres.iter().map(|m| (format!("manoeuvre `{}`", m.name), &m.start, m.span)))
+    }
+
+    /// What is evaluated along a solution, measures first, then criteria: (name, value, place).
+    pub fn outputs(&self) -> impl Iterator<Item = (&str, Node, Span)> {
+        let measures = self.measures.iter().map(|m| (m.name.as_str(), m.value, m.span));
+        measures.chain(self.criteria.iter().map(|c| (c.name.as_str(), c.value, c.span)))
+    }
 }
 
 #[derive(Clone, Debug)]

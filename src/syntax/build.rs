@@ -89,6 +89,9 @@ fn is_keyword(rule: Rule) -> bool {
             | solver_word
             | variant_word
             | law_word
+            | manoeuvre_word
+            | criterion_word
+            | for_word
             | add_word
             | remove_word
             | replace_word
@@ -197,6 +200,8 @@ impl<'a> Builder<'a> {
             Rule::measure => self.measure(parts),
             Rule::group => self.group(parts),
             Rule::experiment => self.experiment(parts),
+            Rule::manoeuvre => self.manoeuvre(parts),
+            Rule::criterion => self.criterion(parts),
             Rule::identify => self.identify(parts),
             Rule::filter => self.filter(parts),
             Rule::solver => Some(ItemKind::Solver { fields: self.fields(parts.next()?) }),
@@ -322,6 +327,32 @@ impl<'a> Builder<'a> {
         let spans: Vec<Span> = members.iter().map(|member| member.span).collect();
         self.check_separators(&spans);
         Some(ItemKind::Group { name, members })
+    }
+
+    fn manoeuvre(&mut self, mut parts: Parts<'_>) -> Built<ItemKind> {
+        let name = self.name(parts.next()?);
+        let title = self.optional_text(&mut parts);
+        let (mut durations, mut fields, mut spans) = (Vec::new(), Vec::new(), Vec::new());
+        while let Some(pair) = parts.next() {
+            spans.push(self.span(&pair));
+            if pair.as_rule() == Rule::duration {
+                durations.push(self.expression(Parts::of(pair).next()?));
+            } else {
+                fields.push(self.field(pair)?);
+            }
+        }
+        self.check_separators(&spans);
+        Some(ItemKind::Manoeuvre { name, title, durations, fields })
+    }
+
+    fn criterion(&mut self, mut parts: Parts<'_>) -> Built<ItemKind> {
+        let name = self.name(parts.next()?);
+        let unit = self.optional_unit(&mut parts);
+        let title = self.optional_text(&mut parts);
+        let value = self.expression(parts.next()?);
+        let manoeuvre = self.name(parts.next()?);
+        let fields = self.optional_fields(&mut parts);
+        Some(ItemKind::Criterion { name, unit, title, value, manoeuvre, fields })
     }
 
     fn experiment(&mut self, mut parts: Parts<'_>) -> Built<ItemKind> {

@@ -77,6 +77,16 @@ fn kind(kind: &ItemKind) -> String {
             let role = role.as_ref().map(|role| format!(" {}", role.text)).unwrap_or_default();
             braces(&format!("experiment {}{role}", name.text), &field_lines(fields), ",", Layout::OneLineIfItFits)
         }
+        ItemKind::Manoeuvre { name, title, durations, fields } => {
+            let mut lines = field_lines(fields);
+            lines.extend(durations.iter().map(|duration| format!("for {}", print_expression(duration))));
+            let head = format!("manoeuvre {}{}", name.text, optional_text(title));
+            braces(&head, &lines, ",", Layout::OneLineIfItFits)
+        }
+        ItemKind::Criterion { name, unit, title, value, manoeuvre, fields } => {
+            let names = format!("criterion {}{}{}", name.text, optional_unit(unit), optional_text(title));
+            with_fields(&format!("{names} = {} in {}", print_expression(value), manoeuvre.text), fields)
+        }
         ItemKind::Identify { lines } => identify(lines),
         ItemKind::Filter { lowpass, remove_mean } => filter(lowpass.as_ref(), *remove_mean),
         ItemKind::Solver { fields } => braces("solver", &field_lines(fields), ",", Layout::OneLineIfItFits),

@@ -5,7 +5,7 @@ use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use std::ops::Range;
 
 /// First words of declarations.
-pub(super) const KEYWORDS: [&str; 19] = [
+pub(super) const KEYWORDS: [&str; 21] = [
     "study",
     "use",
     "gravity",
@@ -20,6 +20,8 @@ pub(super) const KEYWORDS: [&str; 19] = [
     "measure",
     "group",
     "experiment",
+    "manoeuvre",
+    "criterion",
     "identify",
     "filter",
     "solver",
@@ -28,7 +30,7 @@ pub(super) const KEYWORDS: [&str; 19] = [
 ];
 
 /// First words of declarations that are planned.
-const PLANNED: [&str; 6] = ["manoeuvre", "criterion", "model", "for", "table", "family"];
+const PLANNED: [&str; 4] = ["model", "for", "table", "family"];
 
 /// Deeper brackets are refused.
 const DEEPEST_NESTING: usize = 64;

@@ -50,6 +50,18 @@ pub enum ItemKind {
     Group { name: Name, members: Vec<Name> },
     /// `experiment NAME [estimation|validation|test] { fields }`; `start` and `window` are fields.
     Experiment { name: Name, role: Option<Name>, fields: Vec<Field> },
+    /// `manoeuvre NAME "title" { u = 60 mm * smoothstep((t - 1 s) / 20 ms), for 4 s, start = equilibrium }`: what the model is
+    /// used for, without a measurement.
+    Manoeuvre { name: Name, title: Option<Name>, durations: Vec<Expression>, fields: Vec<Field> },
+    /// `criterion NAME [unit] "title" = max(tyre.force) in MANOEUVRE { below = 12 kN, confidence = 99 % }`
+    Criterion {
+        name: Name,
+        unit: Option<Name>,
+        title: Option<Name>,
+        value: Expression,
+        manoeuvre: Name,
+        fields: Vec<Field>,
+    },
     /// `identify { lines }`
     Identify { lines: Vec<IdentifyLine> },
     /// `filter { lowpass butterworth pass 5 Hz (2 dB) stop 7 Hz (20 dB) zero_phase, remove_mean }`

@@ -39,6 +39,8 @@ impl Builder {
             point_quantities: vec![],
             groups: Group { name: "total".into(), groups: vec![], channels: vec![] },
             experiments: vec![],
+            manoeuvres: vec![],
+            criteria: vec![],
             filter: None,
             remove_mean: false,
             solver: Solver { relative_tolerance: 1e-6, method: Method::Automatic },

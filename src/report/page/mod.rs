@@ -10,11 +10,13 @@ mod missing;
 mod parameters;
 mod ranking;
 mod template;
+mod validity;
 mod view;
 
 pub(crate) use missing::{ordered as places, over_rate as missing_over_rate};
 pub use template::RenderError;
 
+use crate::analyse::Validity;
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 
@@ -40,4 +42,12 @@ pub fn identification(fit: &Identification) -> Result<String, RenderError> {
 /// As [`answer`].
 pub fn comparison(variants: &[Identification]) -> Result<String, RenderError> {
     template::render("comparison.html", &view::comparison(variants), &histories::data(&view::variant_curves(variants)))
+}
+
+/// Verdicts on criteria as a page.
+///
+/// # Errors
+/// As [`answer`].
+pub fn validity(result: &Validity) -> Result<String, RenderError> {
+    template::render("validity.html", &validity::view(result), "[]")
 }

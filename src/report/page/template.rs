@@ -3,12 +3,13 @@
 use minijinja::{AutoEscape, Environment, context, value::Serde};
 use serde::Serialize;
 
-const TEMPLATES: [(&str, &str); 5] = [
+const TEMPLATES: [(&str, &str); 6] = [
     ("layout.html", include_str!("layout.html")),
     ("parts.html", include_str!("parts.html")),
     ("answer.html", include_str!("answer.html")),
     ("fit.html", include_str!("fit.html")),
     ("comparison.html", include_str!("comparison.html")),
+    ("validity.html", include_str!("validity.html")),
 ];
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("histories.js");

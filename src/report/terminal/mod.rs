@@ -7,7 +7,9 @@ mod answer;
 mod identification;
 mod sheet;
 mod table;
+mod validity;
 
+use crate::analyse::Validity;
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 
@@ -46,4 +48,14 @@ pub fn comparison(variants: &[Identification]) -> String {
 /// Variants side by side; the first one is the base to which differences refer.
 pub fn comparison_in(variants: &[Identification], colour: Colour) -> String {
     identification::comparison(variants, colour)
+}
+
+/// Verdicts on criteria, without colours.
+pub fn validity(result: &Validity) -> String {
+    validity_in(result, Colour::Never)
+}
+
+/// Verdicts on criteria.
+pub fn validity_in(result: &Validity, colour: Colour) -> String {
+    validity::text(result, colour)
 }

@@ -1,0 +1,55 @@
+//! `ident validate STUDY`
+
+use super::fit::fit_variant;
+use super::output::write_whole;
+use super::session::Session;
+use super::{Failed, Format, StudyArguments};
+use crate::analyse::{MonteCarlo, Verdict, validity};
+use crate::identify::confidence;
+use crate::report;
+use std::path::PathBuf;
+
+#[derive(clap::Args, Debug)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    study: StudyArguments,
+    /// Parameter vectors drawn for the Monte Carlo interval
+    #[arg(long, default_value_t = 400)]
+    samples: usize,
+    /// Seed of the draws; the same seed gives the same digits
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Write the answer as one self-contained page
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
+    let study = &arguments.study;
+    super::set_threads(study.threads)?;
+    let session = Session::open(&study.study, study.format)?;
+    let checked = session.check(&study.variant)?;
+    if checked.criteria.is_empty() {
+        eprintln!(
+            "error: the study declares no criterion\n  help: add `manoeuvre NAME {{ u = ..., for 4 s }}` and `criterion NAME = max(..) in NAME {{ below = .. }}`"
+        );
+        return Err(Failed);
+    }
+    let fit = fit_variant(&session, study, &study.variant)?;
+    let confidence = confidence(&fit.compiled, &fit.fitted);
+    let options = MonteCarlo { samples: arguments.samples, seed: arguments.seed };
+    let result = validity(&fit.compiled, &fit.fitted, &confidence, options);
+    if let Some(path) = &arguments.html {
+        let page = report::page::validity(&result).map_err(|error| {
+            eprintln!("error: the page cannot be made: {error}");
+            Failed
+        })?;
+        write_whole(path, &page)?;
+    }
+    match study.format {
+        Format::Text => print!("{}", report::terminal::validity(&result)),
+        Format::Json => println!("{}", super::output::json(report::json::validity(&result))?),
+    }
+    let answered = result.criteria.iter().all(|criterion| criterion.verdict != Verdict::CannotBeJudged);
+    if answered { Ok(()) } else { Err(Failed) }
+}

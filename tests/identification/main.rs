@@ -1,0 +1,4 @@
+//! Identification with honest statistics, on the shipped studies.
+
+mod shipped;
+mod validity;
