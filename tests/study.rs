@@ -4,6 +4,8 @@
 mod evaluate;
 #[path = "study/inlining.rs"]
 mod inlining;
+#[path = "study/models.rs"]
+mod models;
 #[path = "study/prelude.rs"]
 mod prelude;
 

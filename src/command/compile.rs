@@ -1,8 +1,9 @@
-//! `ident compile STUDY --emit tree|model|equations|tape`
+//! `ident compile STUDY --emit flat|tree|model|equations|tape`
 
 use super::session::Session;
 use super::{Failed, Format};
 use crate::mechanics::{emit_equations, emit_model, emit_tree};
+use crate::study::flat_text;
 use crate::tape::emit_tape;
 use clap::ValueEnum;
 use std::path::PathBuf;
@@ -21,6 +22,8 @@ pub(super) struct Arguments {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Emit {
+    /// The study with models, families and the variant written out
+    Flat,
     /// Spanning tree of bodies and joints
     Tree,
     /// Bodies, joints, force elements, states, measures
@@ -33,8 +36,14 @@ enum Emit {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     let session = Session::open(&arguments.study, Format::Text)?;
+    if arguments.emit == Emit::Flat {
+        let text = flat_text(&session.loaded, Some(&arguments.variant)).map_err(|findings| session.fail(&findings))?;
+        print!("{text}");
+        return Ok(());
+    }
     let compiled = session.compile(&arguments.variant)?;
     let text = match arguments.emit {
+        Emit::Flat => String::new(),
         Emit::Tree => emit_tree(&compiled.study).map_err(|diagnostics| session.fail(&diagnostics))?,
         Emit::Model => emit_model(&compiled.study, &compiled.system),
         Emit::Equations => emit_equations(&compiled.study, &compiled.system),

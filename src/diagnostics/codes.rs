@@ -202,6 +202,45 @@ codes! {
     UNUSED_DECLARATION "E0237" "without use"
     "Something is declared that nothing depends on.\n"
 
+    RECURSIVE_MODEL "E0241" "model contains itself"
+    "A model may use other models as parts, but not itself, neither directly nor through others. What repeats is a family:\n\
+     \n    for i in 1 .. 4 { part link[i]: segment at node[i] }\n"
+
+    PORTS "E0242" "ports of a model"
+    "The places behind `at` bind the ports of the model in their order, one each, and each of the declared kind: `point` takes a\n\
+     body, a point of a body or `ground`; `body` a body or `ground`; `joint`, `force` and `signal` elements of that sort.\n\
+     \n    model corner(carrier: point) { .. }\n    part left: corner at chassis.left { .. }\n"
+
+    FAMILY_RANGE "E0243" "range of a family"
+    "A family runs over whole numbers from the smaller to the larger, both included, that are known before the simulation:\n\
+     numbers, constants, arguments of the model. Its size is limited.\n\
+     \n    for i in 1 .. count { body wheel[i] { mass = 40 kg } }\n"
+
+    INDEX "E0244" "index of a name"
+    "An index is a whole number, made of numbers, loop variables and constants by + - * /: `wheel[i+1]`. A unit in brackets is\n\
+     set apart by a blank: `measure z [mm]`.\n"
+
+    FAMILY_NAME "E0245" "members of a family share a name"
+    "What a family declares bears its variable, so that every member has a name of its own: `body wheel[i] { .. }`. Within the\n\
+     family, `wheel[i]` is this member, `wheel[i+1]` the next one.\n"
+
+    NOT_REPEATABLE "E0246" "cannot be repeated"
+    "Models and families contain what can stand in a machine several times: bodies, joints, forces, signals, constants, measures,\n\
+     parts, families, identified parameters. Experiments, inputs, variants, laws and the like stand outside.\n"
+
+    OUTSIDE_OF_MODEL "E0247" "not known in the model"
+    "A model sees its own declarations, its ports and parameters, `ground`, `t`, `pi` and the constants of the study. Everything\n\
+     else is handed in where the model is used, so that it can be used several times:\n\
+     \n    model strut(upper: point, lower: point) { param stiffness: stiffness  force spring: .. }\n\
+     \n    part front: strut at chassis.front, axle { stiffness = c_front }\n"
+
+    DOTTED_NAME "E0248" "name with a dot"
+    "Dots lead from a part to what it contains: `front.spring`. A declaration may bear such a name only where it adds to a part\n\
+     of the study, as variants do: `add force front.stop: end_stop ..`.\n"
+
+    TOO_LARGE "E0249" "study too large"
+    "Models and families make more declarations than can be treated.\n"
+
     // ---- E03xx: mechanics ----
 
     UNCONNECTED_BODY "E0301" "body is not connected to ground"

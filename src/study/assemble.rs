@@ -16,7 +16,10 @@ impl<'a> Checker<'a> {
         let declared: &'a Declarations<'a> = self.declared;
         self.read_parameters();
         self.read_inputs();
+        self.check_ports();
         self.read_topology();
+        // Before anything that uses the arguments, so that a wrong one is reported where it is written.
+        self.check_arguments();
         self.read_bodies();
         self.place_elements();
         let gravity = self.finished_gravity();
@@ -155,6 +158,7 @@ impl<'a> Checker<'a> {
     /// Every constant, field and binding is checked, whether or not a value depends on it.
     fn check_all_fields(&mut self) {
         let declared: &'a Declarations<'a> = self.declared;
+        self.check_arguments();
         for constant in &declared.constants {
             self.path(constant.name, Scope::Study(Allowed::Constant));
         }

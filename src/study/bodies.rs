@@ -38,9 +38,11 @@ impl<'a> Checker<'a> {
             self.bodies.push(Body { name: name.clone(), mass: zero, centre_of_gravity, inertia, points, span });
         }
         for index in 0..declared.bodies.len() {
-            if let Some(mass) = self.body_mass(index) {
-                self.bodies[index].mass = mass.node;
-            }
+            // A mass that could not be found is not zero.
+            self.bodies[index].mass = match self.body_mass(index) {
+                Some(mass) => mass.node,
+                None => self.graph.constant(f64::NAN),
+            };
             if let Some(inertia) = self.body_inertia(index) {
                 self.bodies[index].inertia = inertia;
             }

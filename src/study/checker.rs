@@ -188,10 +188,26 @@ impl<'a> Checker<'a> {
 
     /// Like [`Checker::report`], but an unknown name is reported at its first place only.
     pub fn fail_unknown<T>(&mut self, name: &str, diagnostic: Diagnostic, scope: Scope) -> Option<T> {
-        if self.unknown.insert(name.to_owned()) {
+        if !self.is_broken(name) && self.unknown.insert(name.to_owned()) {
             self.report(diagnostic, scope);
         }
         None
+    }
+
+    /// Findings about this name would be consequences of others.
+    pub fn ignore_unknown(&mut self, name: &str) {
+        self.unknown.insert(name.to_owned());
+    }
+
+    /// Whether the name could not be written out, so that it is missing for a reason reported already.
+    fn is_broken(&self, name: &str) -> bool {
+        let mut owners = name.match_indices(['.', '[']).map(|(at, _)| &name[..at]).chain([name]);
+        name.is_empty() || self.declared.broken.is_some_and(|broken| owners.any(|owner| broken.contains(owner)))
+    }
+
+    /// A value that is wrong, as reported: what depends on it is not found either.
+    pub fn invalidate(&mut self, key: Key<'a>) {
+        self.memo.insert(key, Slot::Done(None));
     }
 
     /// The value of `key`, found by `find` on first use. `at` is where it is asked for, to report cycles.
@@ -274,6 +290,26 @@ impl<'a> Checker<'a> {
             Site::JointEffect(index) => &declared.effects[index].name.text,
             Site::Trial(index) => self.instances[index].owner,
         }
+    }
+
+    /// The declared thing that a path begins with, and the quantity behind it. Names of parts contain dots, so that the
+    /// longest beginning that is declared counts; of unknown paths the first word.
+    pub fn split_path<'p>(&self, path: &'p str) -> (&'p str, Option<&'p str>) {
+        if self.is_name(path) {
+            return (path, None);
+        }
+        let mut split = path.split_once('.');
+        for (at, _) in path.rmatch_indices('.') {
+            if self.is_name(&path[..at]) {
+                split = Some((&path[..at], &path[at + 1..]));
+                break;
+            }
+        }
+        split.map_or((path, None), |(name, rest)| (name, Some(rest)))
+    }
+
+    fn is_name(&self, path: &str) -> bool {
+        path == "ground" || self.entities.contains_key(path)
     }
 
     pub fn is_parameter(&self, symbol: Symbol) -> bool {

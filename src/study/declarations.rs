@@ -1,13 +1,14 @@
 //! The declarations that hold for one variant, sorted by what they declare.
 
+use super::elaborate::{ArgumentCheck, Flat, FlatItem, PortCheck};
 use super::load::Loaded;
 use super::names::{Namespace, declare};
-use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
+use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::syntax::{
-    Change, EffectDeclaration, ElementPlace, ElementRole, Expression, Field, IdentifyLine, Item, ItemKind,
-    LawDeclaration, Lowpass, Name,
+    EffectDeclaration, ElementPlace, ElementRole, Expression, Field, IdentifyLine, Item, ItemKind, LawDeclaration,
+    Lowpass, Name,
 };
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// What the chosen variant declares; borrows the trees.
 #[derive(Default)]
@@ -37,6 +38,10 @@ pub(super) struct Declarations<'a> {
     /// Declared names in order, `base` not included.
     pub variants: Vec<&'a Name>,
     pub variant: String,
+    pub arguments: &'a [ArgumentCheck],
+    pub ports: &'a [PortCheck],
+    /// Names of what could not be written out; what is missing there is no finding of its own.
+    pub broken: Option<&'a BTreeSet<String>>,
 }
 
 pub(super) struct Constant<'a> {
@@ -135,21 +140,16 @@ pub(super) struct Effect<'a> {
     pub is_prelude: bool,
 }
 
-struct Variant<'a> {
-    name: &'a Name,
-    base: &'a Name,
-    changes: &'a [Change],
-}
-
-/// Sorts the items of all files and applies `variant` (`None` or `base`: no changes).
-pub(super) fn collect<'a>(
-    loaded: &'a Loaded,
-    variant: Option<&str>,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Declarations<'a> {
-    let mut result = Declarations { variant: "base".to_owned(), ..Declarations::default() };
-    let mut items: Vec<(&'a Item, bool)> = Vec::new();
-    let mut variants: Vec<Variant<'a>> = Vec::new();
+/// Sorts the laws and effects of all files and the items of the study.
+pub(super) fn collect<'a>(loaded: &'a Loaded, flat: &'a Flat, diagnostics: &mut Vec<Diagnostic>) -> Declarations<'a> {
+    let mut result = Declarations {
+        variant: flat.variant.clone(),
+        variants: flat.variants.iter().collect(),
+        arguments: &flat.arguments,
+        ports: &flat.ports,
+        broken: Some(&flat.broken),
+        ..Declarations::default()
+    };
     for (tree, is_prelude) in loaded.trees() {
         for item in &tree.items {
             match &item.kind {
@@ -157,22 +157,14 @@ pub(super) fn collect<'a>(
                 ItemKind::Effect(declaration) => {
                     add_effect(&mut result, declaration, &item.documentation, is_prelude, diagnostics);
                 }
-                ItemKind::Variant { name, base, changes } => variants.push(Variant { name, base, changes }),
-                ItemKind::Use { .. } => {}
-                _ => items.push((item, false)),
+                _ => {}
             }
         }
     }
-    check_variants(&variants, diagnostics);
-    result.variants = variants.iter().map(|variant| &variant.name).copied().collect();
-    if let Some(name) = variant.filter(|name| *name != "base") {
-        name.clone_into(&mut result.variant);
-        apply(&variants, name, &mut items, diagnostics);
+    for FlatItem { item, by_variant } in &flat.items {
+        sort(&mut result, item, *by_variant, diagnostics);
     }
-    for (item, by_variant) in items {
-        sort(&mut result, item, by_variant, diagnostics);
-    }
-    check_duplicates(&result, diagnostics);
+    check_duplicates(&result, &flat.parts, diagnostics);
     result
 }
 
@@ -217,143 +209,6 @@ fn second_declaration(sort: &str, name: &Name, earlier: &Name, was_prelude: bool
             .label(name.span, "second declaration")
             .secondary(earlier.span, "first declaration")
             .help("rename or remove one of them")
-    }
-}
-
-/// Names of variants are unique and their bases exist and end at `base`, whether or not they are applied.
-fn check_variants(variants: &[Variant<'_>], diagnostics: &mut Vec<Diagnostic>) {
-    let mut seen: HashMap<&str, &Name> = HashMap::new();
-    for variant in variants {
-        if variant.name.text == "base" {
-            let message = "`base` is the study without a variant";
-            diagnostics
-                .push(Diagnostic::error(Code::DUPLICATE_NAME, message).label(variant.name.span, "choose another name"));
-        }
-        if let Some(first) = seen.insert(&variant.name.text, variant.name) {
-            diagnostics.push(second_declaration("variant", variant.name, first, false));
-        }
-        if variant.base.text != "base" && !variants.iter().any(|other| other.name.text == variant.base.text) {
-            diagnostics.push(unknown_variant(&variant.base.text, variants).label(variant.base.span, "not declared"));
-        }
-    }
-    for variant in variants {
-        let (_, cycle) = chain(variants, variant);
-        // Each cycle is reported once, at its member that comes first in the text.
-        if let Some(cycle) = cycle.filter(|cycle| cycle.iter().all(|name| name.span.start >= variant.name.span.start)) {
-            let names: Vec<&str> = cycle.iter().map(|name| name.text.as_str()).collect();
-            let mut diagnostic = Diagnostic::error(
-                Code::CYCLIC_DEFINITION,
-                format!("variants are based on each other: {}", names.join(", ")),
-            )
-            .label(variant.base.span, "leads back to this variant");
-            for name in cycle.iter().filter(|name| name.text != variant.name.text) {
-                diagnostic = diagnostic.secondary(name.span, "on the way");
-            }
-            diagnostics.push(diagnostic.help("one of them must be `of base`"));
-        }
-    }
-}
-
-fn unknown_variant(name: &str, variants: &[Variant<'_>]) -> Diagnostic {
-    let names = || variants.iter().map(|variant| variant.name.text.as_str()).chain(["base"]);
-    let known: Vec<String> = names().map(|name| format!("`{name}`")).collect();
-    Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no variant `{name}`"))
-        .suggest(similar_name(name, names()))
-        .note(format!("declared: {}", known.join(", ")))
-}
-
-/// The variants from `last` down to the one `of base`; and the members of the cycle if there is no end.
-fn chain<'v, 'a>(variants: &'v [Variant<'a>], last: &'v Variant<'a>) -> (Vec<&'v Variant<'a>>, Option<Vec<&'a Name>>) {
-    let mut chain = vec![last];
-    let mut current = last;
-    while let Some(next) = variants.iter().find(|other| other.name.text == current.base.text) {
-        if next.name.text == last.name.text {
-            let cycle = chain.iter().map(|variant| variant.name).collect();
-            return (chain, Some(cycle));
-        }
-        if chain.iter().any(|seen| seen.name.text == next.name.text) {
-            // Runs into a cycle that does not contain `last`; that one is reported at its own members.
-            return (chain, None);
-        }
-        chain.push(next);
-        current = next;
-    }
-    (chain, None)
-}
-
-fn apply<'a>(
-    variants: &[Variant<'a>],
-    name: &str,
-    items: &mut Vec<(&'a Item, bool)>,
-    diagnostics: &mut Vec<Diagnostic>,
-) {
-    let Some(chosen) = variants.iter().find(|variant| variant.name.text == name) else {
-        diagnostics.push(unknown_variant(name, variants));
-        return;
-    };
-    let (chain, _) = chain(variants, chosen);
-    for variant in chain.into_iter().rev() {
-        for change in variant.changes {
-            match change {
-                Change::Add(item) => items.push((item, true)),
-                Change::Remove(target) => match position(items, &target.text) {
-                    Some(at) => {
-                        items.remove(at);
-                    }
-                    None => diagnostics.push(nothing_to_change(items, target, "remove")),
-                },
-                Change::Replace(item) => replace(items, item, diagnostics),
-            }
-        }
-    }
-}
-
-fn replace<'a>(items: &mut [(&'a Item, bool)], item: &'a Item, diagnostics: &mut Vec<Diagnostic>) {
-    let Some(name) = declared_name(&item.kind) else {
-        let singleton =
-            |other: &(&Item, bool)| std::mem::discriminant(&other.0.kind) == std::mem::discriminant(&item.kind);
-        match items.iter().position(singleton).filter(|_| !matches!(item.kind, ItemKind::Identify { .. })) {
-            Some(at) => items[at] = (item, true),
-            None => diagnostics.push(
-                Diagnostic::error(Code::UNKNOWN_NAME, "there is nothing to replace")
-                    .label(item.span, "the base has no such declaration")
-                    .help("write `add` instead of `replace`"),
-            ),
-        }
-        return;
-    };
-    match position(items, &name.text) {
-        Some(at) => items[at] = (item, true),
-        None => diagnostics.push(nothing_to_change(items, name, "replace")),
-    }
-}
-
-fn nothing_to_change(items: &[(&Item, bool)], target: &Name, verb: &str) -> Diagnostic {
-    let names = items.iter().filter_map(|(item, _)| declared_name(&item.kind)).map(|name| name.text.as_str());
-    Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no `{}` to {verb}", target.text))
-        .label(target.span, "not in the variant's base")
-        .suggest(similar_name(&target.text, names))
-}
-
-fn position(items: &[(&Item, bool)], name: &str) -> Option<usize> {
-    items.iter().position(|(item, _)| declared_name(&item.kind).is_some_and(|declared| declared.text == name))
-}
-
-/// The name by which `remove` and `replace` find an item.
-fn declared_name(kind: &ItemKind) -> Option<&Name> {
-    match kind {
-        ItemKind::Constant { name, .. }
-        | ItemKind::Input { name, .. }
-        | ItemKind::Body { name, .. }
-        | ItemKind::Joint { name, .. }
-        | ItemKind::Element { name, .. }
-        | ItemKind::Formula { name, .. }
-        | ItemKind::Measure { name, .. }
-        | ItemKind::Group { name, .. }
-        | ItemKind::Experiment { name, .. }
-        | ItemKind::Manoeuvre { name, .. }
-        | ItemKind::Criterion { name, .. } => Some(name),
-        _ => None,
     }
 }
 
@@ -409,8 +264,12 @@ fn sort<'a>(result: &mut Declarations<'a>, item: &'a Item, by_variant: bool, dia
         ItemKind::Solver { fields } => once(&mut result.solver, fields.as_slice(), "solver", item.span, diagnostics),
         ItemKind::Law(declaration) => add_law(result, declaration, false, diagnostics),
         ItemKind::Effect(declaration) => add_effect(result, declaration, &item.documentation, false, diagnostics),
-        // The grammar admits neither inside a variant, and outside they are handled before.
-        ItemKind::Variant { .. } | ItemKind::Use { .. } => {}
+        // Written out before, or not admitted by the grammar inside a variant.
+        ItemKind::Variant { .. }
+        | ItemKind::Use { .. }
+        | ItemKind::Model(_)
+        | ItemKind::Part { .. }
+        | ItemKind::Family { .. } => {}
     }
 }
 
@@ -449,7 +308,7 @@ fn add_identified<'a>(
 
 /// Everything that an expression can name shares one namespace; groups, experiments with manoeuvres, and
 /// criteria have their own.
-fn check_duplicates(result: &Declarations<'_>, diagnostics: &mut Vec<Diagnostic>) {
+fn check_duplicates(result: &Declarations<'_>, parts: &[Name], diagnostics: &mut Vec<Diagnostic>) {
     let mut values: Namespace<'_> = BTreeMap::new();
     let constants = result.constants.iter().map(|constant| ("constant", constant.name));
     let inputs = result.inputs.iter().map(|input| ("input", input.name));
@@ -460,7 +319,8 @@ fn check_duplicates(result: &Declarations<'_>, diagnostics: &mut Vec<Diagnostic>
     let effects = result.effects.iter().map(|effect| ("effect", effect.name));
     let measures = result.measures.iter().map(|measure| ("measure", measure.name));
     let all = constants.chain(inputs).chain(bodies).chain(joints).chain(forces).chain(signals).chain(effects);
-    for (sort, name) in all.chain(measures) {
+    let parts = parts.iter().map(|name| ("part", name));
+    for (sort, name) in all.chain(measures).chain(parts) {
         declare(&mut values, sort, name, diagnostics);
     }
     let mut groups: Namespace<'_> = BTreeMap::new();

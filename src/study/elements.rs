@@ -138,7 +138,7 @@ impl<'a> Checker<'a> {
         if matches!(entity, Some(Entity::Body(_))) {
             diagnostic = diagnostic.help("between bodies write `A -> B`");
         }
-        self.fail(diagnostic, SCOPE)
+        if entity.is_none() { self.fail_unknown(&name.text, diagnostic, SCOPE) } else { self.fail(diagnostic, SCOPE) }
     }
 
     /// The stated length, or the distance of the points in the reference configuration.
@@ -254,7 +254,7 @@ impl<'a> Checker<'a> {
             let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no `{}`", name.text))
                 .label(name.span, "not declared")
                 .suggest(similar_name(&name.text, names.iter().copied()));
-            return self.fail(diagnostic, SCOPE);
+            return self.fail_unknown(&name.text, diagnostic, SCOPE);
         };
         let site = match entity {
             Entity::Joint(joint) if self.joint_symbols.get(joint).copied().flatten().is_some() => {

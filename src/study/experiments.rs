@@ -222,7 +222,7 @@ impl<'a> Checker<'a> {
     }
 
     fn start_target(&mut self, path: &str) -> Option<(Symbol, Dimension)> {
-        let (owner, quantity) = path.split_once('.')?;
+        let (owner, Some(quantity)) = self.split_path(path) else { return None };
         if let Some(Entity::Joint(joint)) = self.entities.get(owner) {
             let (symbols, motion) = self.joint_symbols.get(*joint).copied().flatten()?;
             return match quantity {

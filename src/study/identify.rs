@@ -29,6 +29,9 @@ impl<'a> Checker<'a> {
     /// Free names, constants and paths may be identified; other declared things are no numbers.
     fn is_target(&mut self, target: &'a Name) -> bool {
         let entity = self.entities.get(target.text.as_str()).copied();
+        if target.text.is_empty() {
+            return false;
+        }
         let is_reserved = matches!(target.text.as_str(), "t" | "pi");
         if !is_reserved && matches!(entity, None | Some(Entity::Constant(_))) {
             return true;
@@ -181,6 +184,8 @@ impl<'a> Checker<'a> {
                 let message =
                     format!("`{name}` has no influence in variant `{}` and is left out", self.declared.variant);
                 self.report(Diagnostic::warning(Code::LEFT_OUT, message).label(span, "identified here"), NUMBERS);
+            } else if self.parameter_met[index] && self.diagnostics.iter().any(Diagnostic::is_error) {
+                // What it stands in may be wrong.
             } else {
                 let diagnostic =
                     Diagnostic::error(Code::UNUSED_PARAMETER, format!("parameter `{name}` has no influence"))

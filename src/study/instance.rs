@@ -217,7 +217,7 @@ impl<'a> Checker<'a> {
     }
 
     /// Hz is no rad/s: a declared `frequency` or `angular_velocity` insists.
-    fn check_writing(
+    pub fn check_writing(
         &mut self,
         kind: &crate::syntax::TypeExpression,
         value: Typed,

@@ -11,6 +11,7 @@ mod channels;
 mod checker;
 mod declarations;
 mod effects;
+mod elaborate;
 mod elements;
 mod evaluate;
 mod experiments;
@@ -23,6 +24,7 @@ mod load;
 mod manoeuvres;
 mod model;
 mod names;
+mod parts;
 mod paths;
 mod places;
 mod ports;
@@ -34,6 +36,7 @@ pub use load::{Loaded, load, load_text};
 pub use model::*;
 
 use crate::diagnostics::{Code, Diagnostic};
+use crate::syntax::{Tree, print};
 
 /// A study without errors, and what should be said about it nevertheless.
 #[derive(Clone, Debug)]
@@ -43,13 +46,28 @@ pub struct Checked {
     pub warnings: Vec<Diagnostic>,
 }
 
+/// The study with models, parts, families and the variant written out, as text.
+///
+/// # Errors
+/// All findings of reading and writing out when at least one of them is an error.
+pub fn flat_text(loaded: &Loaded, variant: Option<&str>) -> Result<String, Vec<Diagnostic>> {
+    let mut findings = loaded.diagnostics.clone();
+    let flat = elaborate::elaborate(loaded, variant, &mut findings);
+    if findings.iter().any(Diagnostic::is_error) {
+        return Err(findings);
+    }
+    let items = flat.items.into_iter().map(|flat| flat.item).collect();
+    Ok(print(&Tree { items }))
+}
+
 /// Checks a study with one of its variants (`None` or `base`: none).
 ///
 /// # Errors
 /// All findings of reading and checking when at least one of them is an error, in order of their places.
 pub fn check(loaded: &Loaded, variant: Option<&str>) -> Result<Checked, Vec<Diagnostic>> {
     let mut findings = Vec::new();
-    let declarations = declarations::collect(loaded, variant, &mut findings);
+    let flat = elaborate::elaborate(loaded, variant, &mut findings);
+    let declarations = declarations::collect(loaded, &flat, &mut findings);
     let mut checker = checker::Checker::new(&declarations, findings);
     let study = checker.study();
     let mut findings = checker.diagnostics;

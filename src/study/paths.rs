@@ -31,10 +31,7 @@ impl<'a> Checker<'a> {
         if let Some(parameter) = self.parameter(&name.text) {
             return Some(parameter);
         }
-        let (first, rest) = match name.text.split_once('.') {
-            Some((first, rest)) => (first, Some(rest)),
-            None => (name.text.as_str(), None),
-        };
+        let (first, rest) = self.split_path(&name.text);
         let Some(&entity) = self.entities.get(first) else { return self.unknown_path(name, first, rest.is_some()) };
         match (entity, rest) {
             (Entity::Constant(index), None) => self.constant(index, name),
@@ -243,7 +240,7 @@ impl<'a> Checker<'a> {
     }
 
     fn no_quantity(&mut self, name: &'a Name, quantity: &str, known: &[&str]) -> Option<Typed> {
-        let (owner, _) = name.text.split_once('.').unwrap_or((&name.text, ""));
+        let (owner, _) = self.split_path(&name.text);
         let mut diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("`{owner}` has no `{quantity}`"))
             .label(name.span, "not known");
         diagnostic = diagnostic.suggest(similar_name(quantity, known.iter().copied()));

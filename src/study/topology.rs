@@ -170,10 +170,7 @@ impl<'a> Checker<'a> {
 
     /// `ground`, `BODY`, `BODY.POINT`, `ground.POINT`.
     pub fn end(&mut self, name: &'a Name) -> Option<End<'a>> {
-        let (first, point) = match name.text.split_once('.') {
-            Some((first, point)) => (first, Some(point)),
-            None => (name.text.as_str(), None),
-        };
+        let (first, point) = self.split_path(&name.text);
         let bodies = &self.declared.bodies;
         let body = bodies.iter().position(|body| body.name.text == first);
         if first != "ground" && body.is_none() {
@@ -310,7 +307,7 @@ impl<'a> Checker<'a> {
     fn is_child_of_broken_joint(&self, body: usize) -> bool {
         let name = &self.declared.bodies[body].name.text;
         let broken = self.declared.joints.iter().zip(&self.topology.joints).filter(|(_, read)| read.is_none());
-        broken.into_iter().any(|(joint, _)| joint.child.text.split('.').next() == Some(name.as_str()))
+        broken.into_iter().any(|(joint, _)| self.split_path(&joint.child.text).0 == name)
     }
 
     fn report_unconnected(&mut self, root: usize) {

@@ -91,6 +91,8 @@ fn is_keyword(rule: Rule) -> bool {
             | law_word
             | manoeuvre_word
             | criterion_word
+            | model_word
+            | part_word
             | for_word
             | add_word
             | remove_word
@@ -147,7 +149,11 @@ impl<'a> Builder<'a> {
     }
 
     pub fn name(&self, pair: Pair<'_, Rule>) -> Name {
-        Name { text: pair.as_str().trim().to_owned(), span: self.span(&pair) }
+        let mut text = pair.as_str().trim().to_owned();
+        if pair.as_rule() != Rule::written_unit_inside && text.contains('[') {
+            text.retain(|sign| !sign.is_whitespace());
+        }
+        Name { text, span: self.span(&pair) }
     }
 
     /// Text without its quotation marks, with the span of both.
@@ -155,7 +161,7 @@ impl<'a> Builder<'a> {
         Name { span: self.span(&pair), text: pair.as_str().trim_matches('"').to_owned() }
     }
 
-    fn documentation(&self, parts: &mut Parts<'_>) -> String {
+    pub fn documentation(&self, parts: &mut Parts<'_>) -> String {
         let Some(pair) = parts.take(Rule::documentation) else {
             return String::new();
         };
@@ -166,7 +172,7 @@ impl<'a> Builder<'a> {
         lines.collect::<Vec<_>>().join("\n")
     }
 
-    fn declaration(&mut self, pair: Pair<'_, Rule>, documentation: String) -> Built<Item> {
+    pub fn declaration(&mut self, pair: Pair<'_, Rule>, documentation: String) -> Built<Item> {
         let span = self.span(&pair);
         let kind = self.kind(pair.into_inner().next()?)?;
         Some(Item { documentation, kind, span })
@@ -208,6 +214,9 @@ impl<'a> Builder<'a> {
             Rule::variant => self.variant(parts),
             Rule::law => self.law(parts),
             Rule::effect_declaration => self.effect(parts),
+            Rule::model => self.model(parts),
+            Rule::part => self.part(parts),
+            Rule::family => self.family(parts),
             _ => None,
         }
     }
@@ -221,7 +230,7 @@ impl<'a> Builder<'a> {
         Parts::of(pair).next().map(|inside| self.name(inside))
     }
 
-    fn optional_fields(&mut self, parts: &mut Parts<'_>) -> Vec<Field> {
+    pub fn optional_fields(&mut self, parts: &mut Parts<'_>) -> Vec<Field> {
         parts.take(Rule::fields).map(|pair| self.fields(pair)).unwrap_or_default()
     }
 
@@ -534,7 +543,7 @@ impl<'a> Builder<'a> {
         Some(())
     }
 
-    fn declared_list(&mut self, mut parts: Parts<'_>, above: String, into: &mut Vec<Declared>) -> Built<()> {
+    pub fn declared_list(&mut self, mut parts: Parts<'_>, above: String, into: &mut Vec<Declared>) -> Built<()> {
         let mut above = above;
         while let Some(pair) = parts.next() {
             into.push(self.declared(pair, std::mem::take(&mut above))?);

@@ -356,6 +356,9 @@ fn description(rule: Rule) -> Option<(u8, String)> {
         }
         Rule::documentation_line | Rule::if_word => return None,
         Rule::field => (ENTRY_RANK, "a field `key = value`"),
+        Rule::port => (3, "a port `name: body`"),
+        Rule::model_statement => (ENTRY_RANK, "`param` or a declaration"),
+        Rule::member_declaration => (ENTRY_RANK, "a declaration"),
         Rule::point => (ENTRY_RANK, "`point`"),
         Rule::entry => (ENTRY_RANK, "an entry"),
         Rule::duration => (ENTRY_RANK, "`for` with a duration"),
@@ -393,7 +396,8 @@ fn keywords(rule: Rule) -> Vec<&'static str> {
         Rule::law_statement => vec!["param", "let", "state"],
         Rule::effect_statement => vec!["amplitude", "shape", "let", "state", "adds", "replaces"],
         Rule::lowpass => vec!["lowpass"],
-        Rule::changed => KEYWORDS.to_vec(),
+        Rule::changed | Rule::declaration | Rule::member_declaration => KEYWORDS.to_vec(),
+        Rule::model_statement => KEYWORDS.into_iter().chain(["param"]).collect(),
         Rule::flag => vec!["one_sided", "finite"],
         _ => keyword(rule).into_iter().collect(),
     }

@@ -6,6 +6,7 @@
 
 mod build;
 mod build_expression;
+mod build_structure;
 mod explain;
 mod grammar;
 mod print;

@@ -96,7 +96,36 @@ fn kind(kind: &ItemKind) -> String {
         }
         ItemKind::Law(law) => law_text(law),
         ItemKind::Effect(effect) => effect_text(effect),
+        ItemKind::Model(model) => model_text(model),
+        ItemKind::Part { name, model, places, fields } => {
+            let places = if places.is_empty() { String::new() } else { format!(" at {}", names(places).join(", ")) };
+            with_fields(&format!("part {}: {}{places}", name.text, model.text), fields)
+        }
+        ItemKind::Family { variable, low, high, items } => {
+            let range = format!("{} .. {}", print_expression(low), print_expression(high));
+            braces(&format!("for {} in {range}", variable.text), &item_lines(items), "", Layout::Lines)
+        }
     }
+}
+
+fn item_lines(items: &[Item]) -> Vec<String> {
+    items.iter().map(print_item).collect()
+}
+
+fn model_text(model: &ModelDeclaration) -> String {
+    let port = |port: &Port| format!("{}{}: {}", documentation(&port.documentation), port.name.text, port.kind.text);
+    let ports: Vec<String> = model.ports.iter().map(port).collect();
+    let head = if ports.iter().any(|port| port.contains('\n')) {
+        let lines: String = ports.iter().map(|port| format!("  {},\n", indented(port))).collect();
+        format!("model {}(\n{}\n)", model.name.text, lines.trim_end().trim_end_matches(','))
+    } else if ports.is_empty() {
+        format!("model {}", model.name.text)
+    } else {
+        format!("model {}({})", model.name.text, ports.join(", "))
+    };
+    let mut lines: Vec<String> = model.parameters.iter().map(|parameter| statement("param", parameter)).collect();
+    lines.extend(item_lines(&model.items));
+    braces(&head, &lines, "", Layout::Lines)
 }
 
 fn optional_text(text: &Option<Name>) -> String {

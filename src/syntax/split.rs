@@ -5,7 +5,7 @@ use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use std::ops::Range;
 
 /// First words of declarations.
-pub(super) const KEYWORDS: [&str; 21] = [
+pub(super) const KEYWORDS: [&str; 24] = [
     "study",
     "use",
     "gravity",
@@ -27,10 +27,13 @@ pub(super) const KEYWORDS: [&str; 21] = [
     "solver",
     "variant",
     "law",
+    "model",
+    "part",
+    "for",
 ];
 
 /// First words of declarations that are planned.
-const PLANNED: [&str; 4] = ["model", "for", "table", "family"];
+const PLANNED: [&str; 1] = ["table"];
 
 /// Deeper brackets are refused.
 const DEEPEST_NESTING: usize = 64;

@@ -8,7 +8,7 @@ pub struct Tree {
     pub items: Vec<Item>,
 }
 
-/// An identifier or a dotted path where it was written.
+/// An identifier or a dotted path where it was written; indices contain no blanks: `wheel[i+1].force`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Name {
     pub text: String,
@@ -74,6 +74,12 @@ pub enum ItemKind {
     Law(LawDeclaration),
     /// `effect NAME at any joint, force { ... }`
     Effect(EffectDeclaration),
+    /// `model NAME(port: body, ...) { param .. declarations }`
+    Model(ModelDeclaration),
+    /// `part NAME: MODEL at PLACE, PLACE { fields }`: a use of a model; the places bind its ports in their order.
+    Part { name: Name, model: Name, places: Vec<Name>, fields: Vec<Field> },
+    /// `for VARIABLE in LOW .. HIGH { declarations }`: an index family.
+    Family { variable: Name, low: Expression, high: Expression, items: Vec<Item> },
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -222,6 +228,23 @@ pub struct LawDeclaration {
     pub states: Vec<StateDeclaration>,
     /// `= expression`
     pub value: Expression,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelDeclaration {
+    pub name: Name,
+    pub ports: Vec<Port>,
+    pub parameters: Vec<Declared>,
+    pub items: Vec<Item>,
+}
+
+/// What a model is joined to: `frame: body`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Port {
+    pub documentation: String,
+    pub name: Name,
+    /// `body`, `point`, `joint`, `force`, `signal`
+    pub kind: Name,
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -1,0 +1,147 @@
+//! Models, parts and families mean the same as the study written out by hand.
+
+use ident::diagnostics::render;
+use ident::mechanics::{derive, emit_model};
+use ident::study::{Study, check, flat_text, load_text};
+
+const BOGIES: &str = r#"
+study bogies
+gravity = 9.81 m/s^2 along -z
+constant axles = 2
+input u [mm]
+model wheelset(carrier: point) {
+  param stiffness: stiffness
+  body axle { mass = 1200 kg, point middle = (0 m, 0 m, 0.4 m) }
+  joint guide: prismatic(z) ground -> axle
+  force primary: spring axle -> carrier { stiffness = stiffness }
+}
+model bogie(carrier: point) {
+  param stiffness: stiffness, damping: damping = 12 kN*s/m
+  body frame { mass = 2 t }
+  joint lift: prismatic(z) ground -> frame
+  force secondary: spring_damper frame -> carrier { stiffness = stiffness, damping = damping }
+  for i in 1 .. axles {
+    part set[i]: wheelset at frame { stiffness = 2 * stiffness + i * 1 kN/m }
+    force rail[i]: spring ground -> set[i].axle { stiffness = (3 - i) * 20 MN/m }
+  }
+  measure z [mm] = frame.position.z
+}
+body car { mass = 20 t, point front = (9 m, 0 m, 1 m), point rear = (-9 m, 0 m, 1 m) }
+joint heave: prismatic(z) ground -> car
+part front: bogie at car.front { stiffness = c_s }
+part rear: bogie at car.rear { stiffness = 450 kN/m }
+force push: external_load ground -> front.set[1].axle { value = (1 kN/mm) * u }
+measure z [mm] = heave.position
+identify { c_s in 100 .. 900 kN/m from 400 kN/m }
+variant single of base {
+  remove rear.set[2].primary
+  replace force rear.rail[1]: spring ground -> rear.set[1].axle { stiffness = 1 MN/m }
+  add force rear.stay: spring rear.set[2].axle -> rear.frame { stiffness = 3 MN/m }
+  identify { rear.stiffness in 100 .. 900 kN/m from 450 kN/m, front.rail[1].stiffness in 1 .. 90 MN/m from 20 MN/m }
+}
+variant front_only of base { remove rear }
+variant other of base {
+  replace part rear: wheelset at car.rear { stiffness = 1 MN/m }
+  add for k in 1 .. 2 { force stop[k]: spring ground -> front.set[k].axle { stiffness = k * 1 kN/m } }
+}
+"#;
+
+/// The base study, by hand.
+fn written_out() -> String {
+    let mut text = String::from(
+        "study bogies\ngravity = 9.81 m/s^2 along -z\ninput u [mm]\n\
+         body car { mass = 20 t, point front = (9 m, 0 m, 1 m), point rear = (-9 m, 0 m, 1 m) }\n\
+         joint heave: prismatic(z) ground -> car\nconstant rear_stiffness = 450 kN/m\n",
+    );
+    for (part, stiffness) in [("front", "c_s"), ("rear", "rear_stiffness")] {
+        text += &format!(
+            "body {part}_frame {{ mass = 2 t }}\njoint {part}_lift: prismatic(z) ground -> {part}_frame\n\
+             force {part}_secondary: spring_damper {part}_frame -> car.{part} \
+             {{ stiffness = {stiffness}, damping = 12 kN*s/m }}\n"
+        );
+        for i in 1..=2 {
+            text += &format!(
+                "body {part}_set_{i}_axle {{ mass = 1200 kg }}\n\
+                 joint {part}_set_{i}_guide: prismatic(z) ground -> {part}_set_{i}_axle\n\
+                 force {part}_set_{i}_primary: spring {part}_set_{i}_axle -> {part}_frame \
+                 {{ stiffness = 2 * {stiffness} + {i} kN/m }}\n\
+                 force {part}_rail_{i}: spring ground -> {part}_set_{i}_axle {{ stiffness = {} MN/m }}\n",
+                (3 - i) * 20
+            );
+        }
+        text += &format!("measure {part}_z [mm] = {part}_frame.position.z\n");
+    }
+    text + "force push: external_load ground -> front_set_1_axle { value = (1 kN/mm) * u }\n\
+            measure z [mm] = heave.position\nidentify { c_s in 100 .. 900 kN/m from 400 kN/m }\n"
+}
+
+fn checked(text: &str, variant: Option<&str>) -> Study {
+    let loaded = load_text("study", text);
+    check(&loaded, variant).unwrap_or_else(|findings| panic!("{}", render(&findings, &loaded.sources, false))).study
+}
+
+/// The model as text, its lines sorted, without the signs by which the names differ. The order of factors and terms
+/// within a load is that of their first use, and left out of the comparison.
+fn model(study: &Study) -> Vec<String> {
+    let system = derive(study).unwrap_or_else(|findings| panic!("{findings:?}"));
+    let text = emit_model(study, &system).replace(['.', '_', '[', ']'], "");
+    let ordered = |line: &str| {
+        let mut words: Vec<&str> = line.split([' ', '(', ')', '*', '+', '-']).collect();
+        words.sort_unstable();
+        words.join(" ")
+    };
+    let mut lines: Vec<String> =
+        text.lines().map(|line| if line.contains("load =") { ordered(line) } else { line.to_owned() }).collect();
+    lines.sort();
+    lines
+}
+
+#[test]
+fn parts_and_families_are_what_one_would_write_by_hand() {
+    assert_eq!(model(&checked(BOGIES, None)), model(&checked(&written_out(), None)));
+}
+
+#[test]
+fn variants_change_parts() {
+    let single = checked(BOGIES, Some("single"));
+    let names: Vec<&str> = single.forces.iter().map(|force| force.name.as_str()).collect();
+    assert!(!names.contains(&"rear.set[2].primary") && names.contains(&"rear.stay"), "{names:?}");
+    let parameters: Vec<&str> = single.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+    assert_eq!(parameters, ["c_s", "rear.stiffness", "front.rail[1].stiffness"]);
+    let front = checked(BOGIES, Some("front_only"));
+    assert!(front.bodies.iter().all(|body| !body.name.starts_with("rear")));
+    let other = checked(BOGIES, Some("other"));
+    let bodies: Vec<&str> = other.bodies.iter().map(|body| body.name.as_str()).collect();
+    assert!(bodies.contains(&"rear.axle") && !bodies.contains(&"rear.frame"), "{bodies:?}");
+    assert!(other.forces.iter().any(|force| force.name == "stop[2]"));
+}
+
+/// One number of a part is one number of the study, and a field of it can be freed alone.
+#[test]
+fn arguments_are_identified_as_a_whole_or_at_one_place() {
+    let base = checked(BOGIES, None);
+    assert!(base.constants.iter().any(|constant| constant.path == "rear.stiffness"));
+    let one = format!(
+        "{BOGIES}\nvariant one of base {{ identify {{ rear.secondary.stiffness in 1 .. 900 kN/m from 400 kN/m }} }}"
+    );
+    let study = checked(&one, Some("one"));
+    let parameter = study.parameters.iter().find(|parameter| parameter.name == "rear.secondary.stiffness");
+    let symbol = parameter.expect("the parameter of one place").symbol;
+    let depends = |name: &str| {
+        let force = study.forces.iter().find(|force| force.name == name).expect("a force");
+        study.graph.symbols_of(&[force.load]).contains(&symbol)
+    };
+    assert!(depends("rear.secondary") && !depends("rear.set[1].primary") && !depends("front.secondary"));
+}
+
+/// What a study with parts becomes is shown as a study without.
+#[test]
+fn the_flat_study_is_text() {
+    let loaded = load_text("bogies", BOGIES);
+    let text = flat_text(&loaded, Some("single")).unwrap_or_else(|findings| panic!("{findings:?}"));
+    assert!(text.contains("force rear.stay: spring rear.set[2].axle -> rear.frame { stiffness = 3 MN/m }"), "{text}");
+    assert!(text.contains("stiffness = 2 * rear.stiffness + 1 kN/m"), "{text}");
+    assert!(!text.contains("model ") && !text.contains("part ") && !text.contains("for "), "{text}");
+    let (_, findings) = ident::syntax::parse(0, &text);
+    assert!(findings.is_empty(), "{findings:?}\n{text}");
+}
