@@ -8,6 +8,8 @@ mod inlining;
 mod models;
 #[path = "study/prelude.rs"]
 mod prelude;
+#[path = "study/tables.rs"]
+mod tables;
 
 use ident::diagnostics::{Code, render};
 use ident::study::{check, load_text};

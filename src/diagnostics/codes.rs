@@ -241,6 +241,23 @@ codes! {
     TOO_LARGE "E0249" "study too large"
     "Models and families make more declarations than can be treated.\n"
 
+    TABLE_POINTS "E0251" "points of a table"
+    "A table has at least two points with one argument and one value each, the arguments growing from point to point. A bare\n\
+     number takes the unit of the first point that has one:\n\
+     \n    points = ((-0.5 m/s, 2.1 kN), (0, 0), (0.5, -1.2))\n"
+
+    TABLE_FILE "E0252" "file of a table"
+    "The file of a table has a head with the names and units of two columns, the argument first, and below it one point per\n\
+     line. Further columns are refused: it is not guessed which one is meant.\n\
+     \n    v [m/s],F [kN]\n    -0.5,2.1\n    0,0\n"
+
+    TABLE_FORM "E0253" "form of a table"
+    "A table is a function of one argument. It says how it goes between its points and beyond them:\n\
+     \n    table curve(v: rate) -> load {\n      points = ((-1 m/s, 3 kN), (1 m/s, -2 kN))\n      interpolation = monotone\n\
+     \x20     extrapolation = linear\n    }\n\
+     \n`linear`: straight lines; `monotone`: smooth and without overshoot; `cubic`: smooth, for curves without corners. Beyond the\n\
+     points: `constant`, `linear` with the slope at the end, or `error`.\n"
+
     // ---- E03xx: mechanics ----
 
     UNCONNECTED_BODY "E0301" "body is not connected to ground"

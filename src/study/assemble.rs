@@ -16,6 +16,7 @@ impl<'a> Checker<'a> {
         let declared: &'a Declarations<'a> = self.declared;
         self.read_parameters();
         self.read_inputs();
+        self.read_tables();
         self.check_ports();
         self.read_topology();
         // Before anything that uses the arguments, so that a wrong one is reported where it is written.

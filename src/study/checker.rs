@@ -4,7 +4,9 @@ use super::declarations::Declarations;
 use super::elements::PlacedForce;
 use super::evaluate::Typed;
 use super::instance::Instance;
+use super::load::Loaded;
 use super::model::{Body, Constant, Input, JointSymbols, Motion, Parameter, Point, PointQuantity, State};
+use super::tables::Table;
 use super::topology::Topology;
 use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::expression::{Graph, Symbol};
@@ -90,7 +92,10 @@ pub(super) struct SensorState {
 }
 
 pub(super) struct Checker<'a> {
+    pub loaded: &'a Loaded,
     pub declared: &'a Declarations<'a>,
+    /// `None`: wrong, as reported.
+    pub tables: HashMap<&'a str, Option<Table>>,
     pub graph: Graph,
     pub time: Symbol,
     pub diagnostics: Vec<Diagnostic>,
@@ -127,11 +132,13 @@ pub(super) struct Checker<'a> {
 }
 
 impl<'a> Checker<'a> {
-    pub fn new(declared: &'a Declarations<'a>, diagnostics: Vec<Diagnostic>) -> Checker<'a> {
+    pub fn new(loaded: &'a Loaded, declared: &'a Declarations<'a>, diagnostics: Vec<Diagnostic>) -> Checker<'a> {
         let mut graph = Graph::new();
         let time = graph.symbol("t");
         Checker {
+            loaded,
             declared,
+            tables: HashMap::new(),
             graph,
             time,
             diagnostics,

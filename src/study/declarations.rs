@@ -6,7 +6,7 @@ use super::names::{Namespace, declare};
 use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::syntax::{
     EffectDeclaration, ElementPlace, ElementRole, Expression, Field, IdentifyLine, Item, ItemKind, LawDeclaration,
-    Lowpass, Name,
+    Lowpass, Name, TableDeclaration,
 };
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -33,6 +33,7 @@ pub(super) struct Declarations<'a> {
     pub filter: Option<(Option<&'a Lowpass>, bool, Span)>,
     pub solver: Option<&'a [Field]>,
     pub laws: HashMap<&'a str, Law<'a>>,
+    pub tables: Vec<&'a TableDeclaration>,
     /// In order of declaration, the prelude first.
     pub effect_declarations: Vec<Effect<'a>>,
     /// Declared names in order, `base` not included.
@@ -131,6 +132,8 @@ pub(super) struct Identified<'a> {
 pub(super) struct Law<'a> {
     pub declaration: &'a LawDeclaration,
     pub is_prelude: bool,
+    /// Stands for a table, which is checked by itself.
+    pub is_table: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -153,13 +156,17 @@ pub(super) fn collect<'a>(loaded: &'a Loaded, flat: &'a Flat, diagnostics: &mut 
     for (tree, is_prelude) in loaded.trees() {
         for item in &tree.items {
             match &item.kind {
-                ItemKind::Law(declaration) => add_law(&mut result, declaration, is_prelude, diagnostics),
+                ItemKind::Law(declaration) => add_law(&mut result, declaration, is_prelude, false, diagnostics),
+                ItemKind::Table(declaration) => result.tables.push(declaration),
                 ItemKind::Effect(declaration) => {
                     add_effect(&mut result, declaration, &item.documentation, is_prelude, diagnostics);
                 }
                 _ => {}
             }
         }
+    }
+    for law in &flat.table_laws {
+        add_law(&mut result, law, false, true, diagnostics);
     }
     for FlatItem { item, by_variant } in &flat.items {
         sort(&mut result, item, *by_variant, diagnostics);
@@ -172,9 +179,10 @@ fn add_law<'a>(
     result: &mut Declarations<'a>,
     declaration: &'a LawDeclaration,
     is_prelude: bool,
+    is_table: bool,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
-    let law = Law { declaration, is_prelude };
+    let law = Law { declaration, is_prelude, is_table };
     if let Some(earlier) = result.laws.insert(&declaration.name.text, law) {
         diagnostics.push(second_declaration("law", &declaration.name, &earlier.declaration.name, earlier.is_prelude));
     }
@@ -262,13 +270,14 @@ fn sort<'a>(result: &mut Declarations<'a>, item: &'a Item, by_variant: bool, dia
             once(&mut result.filter, filter, "filter", item.span, diagnostics);
         }
         ItemKind::Solver { fields } => once(&mut result.solver, fields.as_slice(), "solver", item.span, diagnostics),
-        ItemKind::Law(declaration) => add_law(result, declaration, false, diagnostics),
+        ItemKind::Law(declaration) => add_law(result, declaration, false, false, diagnostics),
         ItemKind::Effect(declaration) => add_effect(result, declaration, &item.documentation, false, diagnostics),
         // Written out before, or not admitted by the grammar inside a variant.
         ItemKind::Variant { .. }
         | ItemKind::Use { .. }
         | ItemKind::Model(_)
         | ItemKind::Part { .. }
+        | ItemKind::Table(_)
         | ItemKind::Family { .. } => {}
     }
 }

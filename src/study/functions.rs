@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 /// What a function does with the dimensions of its arguments.
 #[derive(Clone, Copy)]
-enum Function {
+pub(super) enum Function {
     /// Dimensionless to dimensionless.
     Ratio(Unary),
     /// Keeps the dimension.
@@ -26,7 +26,7 @@ enum Function {
     Derivative,
 }
 
-const FUNCTIONS: [(&str, usize, Function); 22] = [
+pub(super) const FUNCTIONS: [(&str, usize, Function); 22] = [
     ("sin", 1, Function::Ratio(Unary::Sin)),
     ("cos", 1, Function::Ratio(Unary::Cos)),
     ("tan", 1, Function::Ratio(Unary::Tan)),
@@ -55,10 +55,13 @@ impl<'a> Checker<'a> {
     /// The value of `function(arguments)`.
     pub fn call(&mut self, function: &'a Name, arguments: &'a [Expression], span: Span, scope: Scope) -> Option<Typed> {
         let values: Vec<Option<Typed>> = arguments.iter().map(|argument| self.evaluate(argument, scope)).collect();
+        if self.is_table(&function.text) {
+            return self.call_table(function, arguments, &values, span, scope);
+        }
         let Some(&(_, count, what)) = FUNCTIONS.iter().find(|(name, ..)| *name == function.text) else {
             let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no function `{}`", function.text))
                 .label(function.span, "not a function")
-                .suggest(similar_name(&function.text, FUNCTIONS.iter().map(|(name, ..)| *name)))
+                .suggest(similar_name(&function.text, self.function_names()))
                 .note(format!("functions: {}", FUNCTIONS.map(|(name, ..)| name).join(", ")));
             return self.fail(diagnostic, scope);
         };
@@ -70,6 +73,11 @@ impl<'a> Checker<'a> {
         let values: Option<Vec<(Typed, Span)>> =
             values.into_iter().zip(arguments).map(|(value, argument)| Some((value?, argument.span))).collect();
         self.apply_function(what, function, &values?, span, scope)
+    }
+
+    fn function_names(&self) -> Vec<&'a str> {
+        let tables = self.declared.tables.iter().map(|table| table.name.text.as_str());
+        FUNCTIONS.iter().map(|(name, ..)| *name).chain(tables).collect()
     }
 
     fn apply_function(

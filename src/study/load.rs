@@ -1,7 +1,8 @@
 //! The texts of a study: the prelude, its file, the files it uses.
 
 use crate::diagnostics::{Code, Diagnostic, Sources, Span};
-use crate::syntax::{ItemKind, Tree, parse};
+use crate::syntax::{ItemKind, Tree, Value, parse};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
@@ -24,11 +25,21 @@ pub struct Loaded {
     pub directory: PathBuf,
     /// One per source.
     trees: Vec<Arc<Tree>>,
+    /// Texts of the files that tables name, or why they cannot be read; by index of the study file and path as written.
+    table_texts: BTreeMap<(u32, String), Result<Arc<str>, String>>,
 }
 
+/// Larger files of tables are refused.
+const LARGEST_TABLE: u64 = 4 << 20;
+
 static PRELUDE_LOADED: LazyLock<Loaded> = LazyLock::new(|| {
-    let mut loaded =
-        Loaded { sources: Sources::new(), diagnostics: Vec::new(), directory: PathBuf::new(), trees: Vec::new() };
+    let mut loaded = Loaded {
+        sources: Sources::new(),
+        diagnostics: Vec::new(),
+        directory: PathBuf::new(),
+        trees: Vec::new(),
+        table_texts: BTreeMap::new(),
+    };
     for (name, text) in PRELUDE {
         loaded.append(name, text);
     }
@@ -70,6 +81,11 @@ impl Loaded {
         PRELUDE.len() as u32
     }
 
+    /// The text of a file that a table of study file `file` names.
+    pub(super) fn table_text(&self, file: u32, path: &str) -> Option<&Result<Arc<str>, String>> {
+        self.table_texts.get(&(file, path.to_owned()))
+    }
+
     fn append(&mut self, name: &str, text: &str) -> u32 {
         let file = self.sources.add(name, text);
         let (tree, diagnostics) = parse(file, text);
@@ -106,9 +122,26 @@ impl Loaded {
     fn append_used(&mut self, file: u32, directory: &Path, seen: &mut Vec<PathBuf>) {
         let Some(tree) = self.trees.get(file as usize).cloned() else { return };
         for item in &tree.items {
-            if let ItemKind::Use { path } = &item.kind {
-                self.append_file(&directory.join(&path.text), Some(path.span), seen);
+            match &item.kind {
+                ItemKind::Use { path } => self.append_file(&directory.join(&path.text), Some(path.span), seen),
+                ItemKind::Table(table) => {
+                    for field in table.fields.iter().filter(|field| field.key.text == "file") {
+                        if let Value::Text(path) = &field.value {
+                            let text = read_table(&directory.join(&path.text));
+                            self.table_texts.insert((file, path.text.clone()), text);
+                        }
+                    }
+                }
+                _ => {}
             }
         }
     }
+}
+
+fn read_table(path: &Path) -> Result<Arc<str>, String> {
+    let size = std::fs::metadata(path).map_err(|cause| cause.to_string())?.len();
+    if size > LARGEST_TABLE {
+        return Err(format!("the file is larger than {} MB", LARGEST_TABLE >> 20));
+    }
+    std::fs::read_to_string(path).map(Arc::from).map_err(|cause| cause.to_string())
 }

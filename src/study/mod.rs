@@ -28,6 +28,7 @@ mod parts;
 mod paths;
 mod places;
 mod ports;
+mod tables;
 mod topology;
 mod trial;
 mod units;
@@ -68,7 +69,7 @@ pub fn check(loaded: &Loaded, variant: Option<&str>) -> Result<Checked, Vec<Diag
     let mut findings = Vec::new();
     let flat = elaborate::elaborate(loaded, variant, &mut findings);
     let declarations = declarations::collect(loaded, &flat, &mut findings);
-    let mut checker = checker::Checker::new(&declarations, findings);
+    let mut checker = checker::Checker::new(loaded, &declarations, findings);
     let study = checker.study();
     let mut findings = checker.diagnostics;
     if loaded.diagnostics.iter().any(Diagnostic::is_error) {

@@ -18,7 +18,7 @@ impl<'a> Checker<'a> {
     pub fn check_declarations(&mut self) {
         let declared: &'a super::declarations::Declarations<'a> = self.declared;
         let mut laws: Vec<&'a LawDeclaration> =
-            declared.laws.values().filter(|law| !law.is_prelude).map(|law| law.declaration).collect();
+            declared.laws.values().filter(|law| !law.is_prelude && !law.is_table).map(|law| law.declaration).collect();
         laws.sort_by_key(|law| (law.name.span.file, law.name.span.start));
         for law in laws {
             self.try_law(law);

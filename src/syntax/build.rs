@@ -94,6 +94,8 @@ fn is_keyword(rule: Rule) -> bool {
             | model_word
             | part_word
             | for_word
+            | table_word
+            | points_word
             | add_word
             | remove_word
             | replace_word
@@ -217,6 +219,7 @@ impl<'a> Builder<'a> {
             Rule::model => self.model(parts),
             Rule::part => self.part(parts),
             Rule::family => self.family(parts),
+            Rule::table => self.table(parts),
             _ => None,
         }
     }
@@ -560,7 +563,7 @@ impl<'a> Builder<'a> {
         if between.contains('\n') { last.default.take() } else { None }
     }
 
-    fn declared(&mut self, pair: Pair<'_, Rule>, above: String) -> Built<Declared> {
+    pub fn declared(&mut self, pair: Pair<'_, Rule>, above: String) -> Built<Declared> {
         let whole = self.span(&pair);
         let mut parts = Parts::of(pair);
         let own = self.documentation(&mut parts);
@@ -608,7 +611,7 @@ impl<'a> Builder<'a> {
         Some(())
     }
 
-    fn type_expression(&mut self, pair: Pair<'_, Rule>) -> Built<TypeExpression> {
+    pub fn type_expression(&mut self, pair: Pair<'_, Rule>) -> Built<TypeExpression> {
         let span = self.span(&pair);
         let mut factors = Vec::new();
         let mut sign = 1i8;

@@ -1,4 +1,4 @@
-//! From pest's pairs to the tree: models, their uses, index families.
+//! From pest's pairs to the tree: models, their uses, index families, tables.
 
 use super::build::{Builder, Parts};
 use super::grammar::Rule;
@@ -57,6 +57,39 @@ impl Builder<'_> {
         }
         self.check_item_separators(&items);
         Some(ItemKind::Family { variable, low, high, items })
+    }
+
+    pub fn table(&mut self, mut parts: Parts<'_>) -> Option<ItemKind> {
+        let name = self.name(parts.next()?);
+        let mut arguments = Vec::new();
+        while let Some(pair) = parts.take(Rule::declared) {
+            arguments.push(self.declared(pair, String::new())?);
+        }
+        let result = self.type_expression(parts.next()?)?;
+        let (mut points, mut fields, mut spans) = (None, Vec::new(), Vec::new());
+        while let Some(pair) = parts.next() {
+            let span = self.span(&pair);
+            spans.push(span);
+            if pair.as_rule() == Rule::field {
+                fields.push(self.field(pair)?);
+                continue;
+            }
+            let pairs = self.points(Parts::of(pair));
+            match &points {
+                Some((_, first)) => self.report_repeated("the table has two lists of points", span, *first),
+                None => points = Some((pairs, span)),
+            }
+        }
+        self.check_separators(&spans);
+        Some(ItemKind::Table(TableDeclaration { name, arguments, result, points, fields }))
+    }
+
+    fn points(&mut self, mut parts: Parts<'_>) -> Vec<Vec<Expression>> {
+        let mut points = Vec::new();
+        while let Some(point) = parts.next() {
+            points.push(self.expressions(point));
+        }
+        points
     }
 
     fn check_item_separators(&mut self, items: &[Item]) {

@@ -357,6 +357,8 @@ fn description(rule: Rule) -> Option<(u8, String)> {
         Rule::documentation_line | Rule::if_word => return None,
         Rule::field => (ENTRY_RANK, "a field `key = value`"),
         Rule::port => (3, "a port `name: body`"),
+        Rule::table_point => (3, "a point `(1 m/s, 2 kN)`"),
+        Rule::points => (ENTRY_RANK, "`points`"),
         Rule::model_statement => (ENTRY_RANK, "`param` or a declaration"),
         Rule::member_declaration => (ENTRY_RANK, "a declaration"),
         Rule::point => (ENTRY_RANK, "`point`"),

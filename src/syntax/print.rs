@@ -96,6 +96,7 @@ fn kind(kind: &ItemKind) -> String {
         }
         ItemKind::Law(law) => law_text(law),
         ItemKind::Effect(effect) => effect_text(effect),
+        ItemKind::Table(table) => table_text(table),
         ItemKind::Model(model) => model_text(model),
         ItemKind::Part { name, model, places, fields } => {
             let places = if places.is_empty() { String::new() } else { format!(" at {}", names(places).join(", ")) };
@@ -110,6 +111,24 @@ fn kind(kind: &ItemKind) -> String {
 
 fn item_lines(items: &[Item]) -> Vec<String> {
     items.iter().map(print_item).collect()
+}
+
+fn table_text(table: &TableDeclaration) -> String {
+    let arguments: Vec<String> = table.arguments.iter().map(declared).collect();
+    let head = format!("table {}({}) -> {}", table.name.text, arguments.join(", "), type_text(&table.result));
+    let mut lines = Vec::new();
+    if let Some((points, _)) = &table.points {
+        let points: Vec<String> = points.iter().map(|point| tuple(point)).collect();
+        let line = format!("points = ({})", points.join(", "));
+        lines.push(if line.chars().count() < WIDTH {
+            line
+        } else {
+            let points: String = points.iter().map(|point| format!("  {point},\n")).collect();
+            format!("points = (\n{points})")
+        });
+    }
+    lines.extend(field_lines(&table.fields));
+    braces(&head, &lines, ",", Layout::OneLineIfItFits)
 }
 
 fn model_text(model: &ModelDeclaration) -> String {

@@ -5,7 +5,7 @@ use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use std::ops::Range;
 
 /// First words of declarations.
-pub(super) const KEYWORDS: [&str; 24] = [
+pub(super) const KEYWORDS: [&str; 25] = [
     "study",
     "use",
     "gravity",
@@ -30,10 +30,11 @@ pub(super) const KEYWORDS: [&str; 24] = [
     "model",
     "part",
     "for",
+    "table",
 ];
 
 /// First words of declarations that are planned.
-const PLANNED: [&str; 1] = ["table"];
+const PLANNED: [&str; 2] = ["family", "event"];
 
 /// Deeper brackets are refused.
 const DEEPEST_NESTING: usize = 64;

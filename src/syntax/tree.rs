@@ -74,6 +74,8 @@ pub enum ItemKind {
     Law(LawDeclaration),
     /// `effect NAME at any joint, force { ... }`
     Effect(EffectDeclaration),
+    /// `table NAME(argument: type) -> type { points = .., interpolation = .., extrapolation = .. }`
+    Table(TableDeclaration),
     /// `model NAME(port: body, ...) { param .. declarations }`
     Model(ModelDeclaration),
     /// `part NAME: MODEL at PLACE, PLACE { fields }`: a use of a model; the places bind its ports in their order.
@@ -228,6 +230,18 @@ pub struct LawDeclaration {
     pub states: Vec<StateDeclaration>,
     /// `= expression`
     pub value: Expression,
+}
+
+/// A characteristic curve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableDeclaration {
+    pub name: Name,
+    /// One in a sound study.
+    pub arguments: Vec<Declared>,
+    pub result: TypeExpression,
+    /// `points = ((x, y), ...)`: the pairs, and where they stand.
+    pub points: Option<(Vec<Vec<Expression>>, Span)>,
+    pub fields: Vec<Field>,
 }
 
 #[derive(Clone, Debug, PartialEq)]

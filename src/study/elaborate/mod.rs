@@ -9,13 +9,15 @@ mod number;
 mod part;
 mod rewrite;
 mod scope;
+mod table;
 mod variants;
 
 use super::load::Loaded;
 use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
-use crate::syntax::{Change, Expression, Item, ItemKind, ModelDeclaration, Name, TypeExpression};
+use crate::syntax::{Change, Expression, Item, ItemKind, LawDeclaration, ModelDeclaration, Name, TypeExpression};
 use scope::Scope;
 use std::collections::{BTreeMap, BTreeSet};
+use table::table_law;
 
 /// More declarations than this are refused.
 const MOST_ITEMS: usize = 20_000;
@@ -24,6 +26,8 @@ const MOST_ITEMS: usize = 20_000;
 pub(super) struct Flat {
     pub items: Vec<FlatItem>,
     pub parts: Vec<Name>,
+    /// The laws that tables stand for.
+    pub table_laws: Vec<LawDeclaration>,
     pub arguments: Vec<ArgumentCheck>,
     pub ports: Vec<PortCheck>,
     /// Names (without indices) of what could not be written out; reported already.
@@ -67,6 +71,7 @@ pub(super) fn elaborate(loaded: &Loaded, variant: Option<&str>, diagnostics: &mu
             match &item.kind {
                 // Laws and effects of files are no part of what a variant changes.
                 ItemKind::Law(_) | ItemKind::Effect(_) | ItemKind::Use { .. } => {}
+                ItemKind::Table(table) => elaborator.flat.table_laws.push(table_law(table)),
                 ItemKind::Variant { name, base, changes } => {
                     variants.push(variants::Variant { name, base, changes });
                 }
@@ -115,6 +120,7 @@ impl<'t, 'd> Elaborator<'t, 'd> {
         let flat = Flat {
             items: Vec::new(),
             parts: Vec::new(),
+            table_laws: Vec::new(),
             arguments: Vec::new(),
             ports: Vec::new(),
             broken: BTreeSet::new(),
@@ -221,6 +227,7 @@ impl<'t, 'd> Elaborator<'t, 'd> {
             ItemKind::Solver { .. } => "`solver`",
             ItemKind::Variant { .. } => "a variant",
             ItemKind::Law(_) => "a law",
+            ItemKind::Table(_) => "a table",
             ItemKind::Effect(_) => "an effect's declaration",
             ItemKind::Model(_) => "a model's declaration",
             _ => return true,

@@ -77,6 +77,7 @@ impl Elaborator<'_, '_> {
             | ItemKind::Law(_)
             | ItemKind::Effect(_)
             | ItemKind::Model(_)
+            | ItemKind::Table(_)
             | ItemKind::Part { .. }
             | ItemKind::Family { .. } => {}
         }

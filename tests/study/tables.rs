@@ -1,0 +1,135 @@
+//! Tables as functions and as laws.
+
+use crate::evaluate::{close, study, value};
+use ident::diagnostics::{Code, render};
+use ident::study::{Study, check, load};
+use std::fs;
+
+const SLIDE: &str = "study s\nbody b { mass = 2 kg }\njoint guide: prismatic(z) ground -> b\n\
+    measure z [mm] = guide.position\n";
+
+fn load_at(study: &Study, v: f64) -> f64 {
+    let force = study.forces.iter().find(|force| force.name == "d").expect("the force");
+    value(study, force.load, &[("guide.velocity", v)])
+}
+
+fn curve(interpolation: &str, extrapolation: &str) -> Study {
+    study(&format!(
+        "{SLIDE}table curve(v: rate) -> load {{
+           points = ((-1 m/s, 2 kN), (-500 mm/s, 1.5), (0, 0), (0.5, -1.5), (1, -1.6))
+           interpolation = {interpolation}, extrapolation = {extrapolation}
+         }}
+         force d: curve on guide"
+    ))
+}
+
+#[test]
+fn tables_pass_their_points_and_go_on_beyond_them() {
+    for interpolation in ["linear", "monotone", "cubic"] {
+        for (extrapolation, beyond) in [("constant", Some(-1600.0)), ("linear", None), ("error", None)] {
+            let study = curve(interpolation, extrapolation);
+            let points = [(-1.0, 2000.0), (-0.5, 1500.0), (0.0, 0.0), (0.5, -1500.0), (1.0, -1600.0)];
+            for (v, load) in points {
+                assert!((load_at(&study, v) - load).abs() < 1e-9, "{interpolation} {extrapolation} at {v}");
+            }
+            if let Some(beyond) = beyond {
+                close(load_at(&study, 3.0), beyond);
+                close(load_at(&study, -3.0), 2000.0);
+            }
+            assert_eq!(load_at(&study, 1.1).is_nan(), extrapolation == "error");
+        }
+    }
+    // The slope of the last piece goes on.
+    close(load_at(&curve("linear", "linear"), 2.0), -1800.0);
+    close(load_at(&curve("linear", "linear"), -2.0), 3000.0);
+    close(load_at(&curve("linear", "constant"), 0.25), -750.0);
+}
+
+/// Between its points the derivative of the expression is that of the curve.
+#[test]
+fn derivatives_follow() {
+    for interpolation in ["linear", "monotone", "cubic"] {
+        let mut study = curve(interpolation, "linear");
+        let load = study.forces[0].load;
+        let rate = study.forces[0].rate;
+        let slope = study.graph.differentiate(&[load], rate)[0];
+        for v in [-1.7, -0.8, -0.3, 0.2, 0.77, 1.4] {
+            let numeric = (load_at(&study, v + 1e-6) - load_at(&study, v - 1e-6)) / 2e-6;
+            let exact = value(&study, slope, &[("guide.velocity", v)]);
+            assert!((numeric - exact).abs() < 1e-3 * exact.abs().max(1.0), "{interpolation} at {v}: {numeric} {exact}");
+        }
+    }
+}
+
+/// A table is a function of any expression, and as a law it has a factor that can be identified.
+#[test]
+fn tables_serve_in_laws_and_formulas() {
+    let study = study(&format!(
+        "{SLIDE}table damping(v: velocity) -> force {{ points = ((0 m/s, 0 N), (1, 10), (2, 12)),
+           interpolation = linear, extrapolation = linear }}
+         table stiffening(x: length) -> ratio {{ points = ((0 mm, 1), (10, 1.5)), interpolation = linear,
+           extrapolation = constant }}
+         law symmetric(x: coordinate, v: rate) -> load {{ = -sign(v) * damping(abs(v)) * stiffening(abs(x)) }}
+         force d: symmetric on guide
+         force e: damping on guide {{ factor = -2 }}
+         signal worn = damping(2 * guide.velocity)
+         measure w [N] = worn
+         identify {{ e.factor in -9 .. 9 from -2 }}"
+    ));
+    let at =
+        |node, x: f64, v: f64| value(&study, node, &[("guide.position", x), ("guide.velocity", v), ("e.factor", -3.0)]);
+    close(at(study.forces[0].load, 0.005, -1.0), 12.5);
+    close(at(study.forces[1].load, 0.0, 0.5), -15.0);
+    close(at(study.measures.iter().find(|measure| measure.name == "w").expect("w").value, 0.0, 0.75), 11.0);
+}
+
+#[test]
+fn tables_come_from_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("writable folder");
+    let table = "table curve(v: rate) -> load { file = \"curve.csv\", interpolation = linear, extrapolation = error }\n\
+                 force d: curve on guide\n";
+    write("s.ident", &format!("{SLIDE}{table}"));
+    write("curve.csv", "v [mm/s];F [kN]\n# measured cold\n-1000;1,5\n0;0\n500;-1\n");
+    let read = || {
+        let loaded = load(&folder.path().join("s.ident"));
+        check(&loaded, None).map_err(|findings| (render(&findings, &loaded.sources, false), findings))
+    };
+    let study = read().unwrap_or_else(|(text, _)| panic!("{text}")).study;
+    close(load_at(&study, -0.5), 750.0);
+    close(load_at(&study, 0.25), -500.0);
+    for (text, code, told) in [
+        ("v [mm/s],F [kN]\n0,0\n1,x\n", Code::TABLE_FILE, "`1`, `x` are not two numbers"),
+        ("v [mm/s],F [kN],T [degC]\n0,0,1\n", Code::TABLE_FILE, "3 cells instead of two"),
+        ("0,1\n1,2\n", Code::TABLE_FILE, "holds numbers instead of names"),
+        ("v [mm/s],F [kM]\n0,1\n", Code::TABLE_FILE, "kM"),
+        ("v [mm/s],F [kN]\n0,1\n0,2\n", Code::TABLE_POINTS, "do not grow from point 1 to point 2"),
+        ("v [mm/s],F [kN]\n0,1\n", Code::TABLE_POINTS, "at least two points"),
+        ("v [mm],F [kN]\n0,1\n1,2\n", Code::DIMENSION_MISMATCH, "do not have the declared types"),
+        ("", Code::TABLE_FILE, "empty"),
+    ] {
+        write("curve.csv", text);
+        let (shown, findings) = read().expect_err(text);
+        assert!(findings.iter().any(|finding| finding.code == code), "{shown}");
+        assert!(shown.contains(told), "{shown}");
+    }
+    fs::remove_file(folder.path().join("curve.csv")).expect("removable");
+    let (shown, findings) = read().expect_err("a missing file");
+    assert!(findings.iter().any(|finding| finding.code == Code::CANNOT_READ_FILE), "{shown}");
+}
+
+/// A road or track of thousands of points is read and evaluated in reasonable time.
+#[test]
+fn long_tables_are_treated() {
+    let points: Vec<String> = (0..4000).map(|at| format!("({at} m, {} mm)", f64::from(at % 17) * 0.1)).collect();
+    let text = format!(
+        "{SLIDE}table track(s: length) -> length {{ points = ({}), interpolation = monotone, extrapolation = constant }}\n\
+         signal height = track(20 m/s * t - 2.5 m)\nmeasure h [mm] = height",
+        points.join(", ")
+    );
+    let begin = std::time::Instant::now();
+    let study = study(&text);
+    assert!(begin.elapsed().as_secs_f64() < 10.0, "{:?}", begin.elapsed());
+    let height = study.measures.iter().find(|measure| measure.name == "h").expect("the measure").value;
+    close(value(&study, height, &[("t", 0.125 + 16.0 / 20.0)]), 1.6e-3);
+}
