@@ -34,7 +34,7 @@ pub(super) const KEYWORDS: [&str; 25] = [
 ];
 
 /// First words of declarations that are planned.
-const PLANNED: [&str; 2] = ["family", "event"];
+const PLANNED: [&str; 2] = ["event", "contact"];
 
 /// Deeper brackets are refused.
 const DEEPEST_NESTING: usize = 64;
