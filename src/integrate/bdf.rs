@@ -169,20 +169,20 @@ impl Bdf {
         self.history.predict(&mut self.z, &mut self.z_prime);
         self.correction.fill(0.0);
         self.newton.solve(system, &self.norm, &mut step_end!(self, end, n)).map_err(Rejection::Newton)?;
-        let state = self.norm.of_state(&self.correction);
+        let state = self.size_of_correction(system, true);
         if self.history.error_constant * state.norm > 1.0 {
             self.trouble = (FailureCause::StepTooSmall, Some(state.component));
-            return Err(Rejection::Error(self.choose_order(state.norm, true)));
+            return Err(Rejection::Error(self.choose_order(system, state.norm, true)));
         }
         if system.p == 0 {
-            return Ok((self.choose_order(state.norm, true), state));
+            return Ok((self.choose_order(system, state.norm, true), state));
         }
         self.solve_sensitivities(system, end).map_err(Rejection::Newton)?;
         if self.norm.is_adaptive() {
             self.norm.set_weights_between(&self.history.differences[0], &self.z);
         }
-        let size = self.norm.of(&self.correction);
-        let choice = self.choose_order(size.norm, false);
+        let size = self.size_of_correction(system, false);
+        let choice = self.choose_order(system, size.norm, false);
         if self.history.error_constant * size.norm > 1.0 {
             self.trouble = (FailureCause::StepTooSmall, Some(size.component));
             return Err(Rejection::Error(choice));
@@ -222,12 +222,25 @@ impl Bdf {
         Ok(())
     }
 
-    fn size_of_scratch(&mut self, state_only: bool) -> f64 {
-        if state_only { self.norm.of_state(&self.scratch).norm } else { self.norm.of(&self.scratch).norm }
+    fn size_of_correction<D: Dynamics + ?Sized>(&mut self, system: &Augmented<D>, state_only: bool) -> Size {
+        self.scratch.copy_from_slice(&self.correction);
+        self.size_of_scratch(system, state_only)
+    }
+
+    /// Leaves the scratch memory changed.
+    fn size_of_scratch<D: Dynamics + ?Sized>(&mut self, system: &Augmented<D>, state_only: bool) -> Size {
+        let part = if state_only { system.n } else { self.scratch.len() };
+        self.newton.filter(system, &mut self.scratch[..part]);
+        if state_only { self.norm.of_state(&self.scratch) } else { self.norm.of(&self.scratch) }
     }
 
     /// Whether the order below would have had a smaller error; `size` is the norm of the correction.
-    fn choose_order(&mut self, size: f64, state_only: bool) -> OrderChoice {
+    fn choose_order<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &Augmented<D>,
+        size: f64,
+        state_only: bool,
+    ) -> OrderChoice {
         let k = self.history.order;
         let sigma = self.history.sigma;
         let error = sigma[k] * size;
@@ -237,13 +250,14 @@ impl Bdf {
             return choice;
         }
         add(&mut self.scratch, &self.correction, &self.history.differences[k]);
-        let below = sigma[k - 1] * self.size_of_scratch(state_only);
+        let below = sigma[k - 1] * self.size_of_scratch(system, state_only).norm;
         choice.scaled_below = k as f64 * below;
         let lower = if k == 2 {
             choice.scaled_below <= 0.5 * scaled
         } else {
+            add(&mut self.scratch, &self.correction, &self.history.differences[k]);
             accumulate(&mut self.scratch, &self.history.differences[k - 1]);
-            let scaled_two_below = (k - 1) as f64 * sigma[k - 2] * self.size_of_scratch(state_only);
+            let scaled_two_below = (k - 1) as f64 * sigma[k - 2] * self.size_of_scratch(system, state_only).norm;
             choice.scaled_below.max(scaled_two_below) <= scaled
         };
         if lower {
@@ -267,7 +281,7 @@ impl Bdf {
         if choice.order < k || k == MAXIMUM_ORDER {
             self.growing = false;
         }
-        let next = if self.growing { None } else { Some(self.next_order(choice, order_change, system.p == 0)) };
+        let next = if self.growing { None } else { Some(self.next_order(system, choice, order_change)) };
         self.history.accept(end, &self.correction);
         match next {
             None if fresh => {}
@@ -289,7 +303,12 @@ impl Bdf {
     }
 
     /// Order of the next step and the error to expect of it at the present length.
-    fn next_order(&mut self, choice: OrderChoice, order_change: i64, state_only: bool) -> (usize, f64) {
+    fn next_order<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &Augmented<D>,
+        choice: OrderChoice,
+        order_change: i64,
+    ) -> (usize, f64) {
         let k = self.history.order;
         if choice.order < k {
             return (choice.order, choice.error);
@@ -298,7 +317,7 @@ impl Bdf {
             return (k, choice.error);
         }
         subtract(&mut self.scratch, &self.correction, &self.history.differences[k + 1]);
-        let above = self.size_of_scratch(state_only) / (k + 2) as f64;
+        let above = self.size_of_scratch(system, system.p == 0).norm / (k + 2) as f64;
         let scaled_above = (k + 2) as f64 * above;
         if k == 1 {
             return if scaled_above < 0.5 * choice.scaled { (2, above) } else { (1, choice.error) };

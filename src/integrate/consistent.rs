@@ -9,7 +9,8 @@ use super::stepper::first_not_finite;
 use crate::linear::Factorisation;
 
 const MAXIMUM_ITERATIONS: usize = 12;
-/// Converged when corrections are this small against the largest value of their component on the way.
+/// Converged when corrections, in typical magnitudes, are this small against the largest value among the derivatives or
+/// among the algebraic values; Newton's method being quadratic, what remains is rounding.
 const TOLERANCE: f64 = 1e-10;
 /// Differences along the solution move the fastest component by this share of its typical magnitude.
 const DISTANCE: f64 = 1e-3;
@@ -103,7 +104,6 @@ impl Point {
         y_prime: &mut [f64],
     ) -> Consistency {
         let mut residual = vec![0.0; system.n];
-        let mut largest = vec![0.0f64; system.n];
         let drift = self.drift(system, y, y_prime);
         for _ in 0..MAXIMUM_ITERATIONS {
             system.residual(self.t, y, y_prime, &mut residual);
@@ -116,15 +116,16 @@ impl Point {
                 return Consistency::Undetermined;
             }
             factorisation.solve(&mut residual);
-            let mut converged = true;
+            let (mut change, mut largest) = ([0.0f64; 2], [0.0f64; 2]);
             for i in 0..system.n {
+                let kind = usize::from(self.differential[i]);
                 let unknown = if self.differential[i] { &mut y_prime[i] } else { &mut y[i] };
-                largest[i] = largest[i].max(unknown.abs());
                 *unknown -= residual[i];
-                largest[i] = largest[i].max(unknown.abs());
-                converged &= residual[i].abs() <= TOLERANCE * largest[i];
+                let scale = system.dynamics.scale()[i];
+                change[kind] = change[kind].max(residual[i].abs() / scale);
+                largest[kind] = largest[kind].max(unknown.abs() / scale);
             }
-            if converged {
+            if change.iter().zip(&largest).all(|(change, largest)| *change <= TOLERANCE * largest) {
                 return Consistency::Reached;
             }
         }

@@ -2,6 +2,7 @@
 
 use super::problem::{Dynamics, Failure, FailureCause, Work};
 use super::stepper::first_not_finite;
+use super::structure::Structure;
 use crate::linear::SingularValueDecomposition;
 
 const MAXIMUM_ITERATIONS: usize = 200;
@@ -11,6 +12,8 @@ const CONVERGED: f64 = 1e-9;
 const ROUNDING: f64 = 1e-14;
 /// Singular values below this share of the largest mean a direction that the equations do not determine.
 const UNDETERMINED: f64 = 1e-12;
+/// Equations and components with at least this share in a contradiction or dependence are named.
+const SHARE: f64 = 0.1;
 /// Damping as share of the largest singular value: first value after a failed full step, its growth, and the number of
 /// attempts before giving up.
 const FIRST_DAMPING: f64 = 1e-4;
@@ -41,8 +44,9 @@ pub struct Equilibrium {
 ///
 /// # Errors
 ///
-/// [`FailureCause::NoEquilibrium`] naming the component whose equation cannot be satisfied, or the component that the
-/// equations leave undetermined (free to move without stiffness); [`FailureCause::NotFinite`] where the model cannot be
+/// [`FailureCause::NoEquilibrium`] naming the equations that cannot be satisfied together, or the component that the
+/// equations leave undetermined (free to move without stiffness); [`FailureCause::RedundantConstraints`] naming the
+/// constraints whose forces are undetermined (static redundancy); [`FailureCause::NotFinite`] where the model cannot be
 /// evaluated at the start.
 pub fn equilibrium<D: Dynamics + ?Sized>(
     dynamics: &mut D,
@@ -54,7 +58,8 @@ pub fn equilibrium<D: Dynamics + ?Sized>(
     let n = dynamics.dimension();
     let complete = y.len() == n && unknown.len() == n && sensitivity.len() == n * dynamics.parameter_count();
     if !complete {
-        return Err(fail(t, FailureCause::InvalidRequest, None, Work::default()));
+        let trouble = Trouble { cause: FailureCause::InvalidRequest, component: None, equations: Vec::new() };
+        return Err(fail(t, trouble, Work::default()));
     }
     let mut search = Search::new(dynamics, t, y, unknown);
     if search.unknowns.is_empty() {
@@ -63,15 +68,28 @@ pub fn equilibrium<D: Dynamics + ?Sized>(
     }
     match search.solve().and_then(|()| search.sensitivity(sensitivity)) {
         Ok(sensitivity) => Ok(Equilibrium { y: search.y, y_prime: vec![0.0; n], sensitivity, work: search.work }),
-        Err((cause, component)) => Err(fail(t, cause, component, search.work)),
+        Err(trouble) => Err(fail(t, trouble, search.work)),
     }
 }
 
-fn fail(time: f64, cause: FailureCause, component: Option<usize>, work: Work) -> Failure {
-    Failure { time, cause, component, equations: Vec::new(), work: Box::new(work) }
+fn fail(time: f64, trouble: Trouble, work: Work) -> Failure {
+    let Trouble { cause, component, equations } = trouble;
+    Failure { time, cause, component, equations, work: Box::new(work) }
 }
 
-type Outcome<T> = Result<T, (FailureCause, Option<usize>)>;
+struct Trouble {
+    cause: FailureCause,
+    component: Option<usize>,
+    equations: Vec<usize>,
+}
+
+impl Trouble {
+    fn with(cause: FailureCause, component: Option<usize>) -> Self {
+        Self { cause, component, equations: Vec::new() }
+    }
+}
+
+type Outcome<T> = Result<T, Trouble>;
 
 struct Search<'d, D: ?Sized> {
     dynamics: &'d mut D,
@@ -119,7 +137,7 @@ impl<'d, D: Dynamics + ?Sized> Search<'d, D> {
         self.dynamics.jacobian(self.t, &self.y, &self.zero, 0.0, &mut values);
         let pattern = self.dynamics.pattern();
         if let Some(entry) = first_not_finite(&values) {
-            return Err((FailureCause::NotFinite, Some(pattern.rows[entry])));
+            return Err(Trouble::with(FailureCause::NotFinite, Some(pattern.rows[entry])));
         }
         let mut matrix = vec![0.0; n * n];
         for ((row, column), &value) in pattern.entries().zip(&values) {
@@ -140,14 +158,14 @@ impl<'d, D: Dynamics + ?Sized> Search<'d, D> {
             .collect();
         self.work.factorisations += 1;
         let decomposition = SingularValueDecomposition::new(self.rows.len(), self.unknowns.len(), &scaled)
-            .map_err(|_| (FailureCause::NoEquilibrium, None))?;
+            .map_err(|_| Trouble::with(FailureCause::NoEquilibrium, None))?;
         Ok(Linearisation { decomposition, matrix, row_factor })
     }
 
     fn solve(&mut self) -> Outcome<()> {
         let mut residual = self.residual(&self.y.clone());
         if let Some(row) = first_not_finite(&residual) {
-            return Err((FailureCause::NotFinite, Some(self.rows[row])));
+            return Err(Trouble::with(FailureCause::NotFinite, Some(self.rows[row])));
         }
         for _ in 0..MAXIMUM_ITERATIONS {
             let linearisation = self.linearise()?;
@@ -161,14 +179,14 @@ impl<'d, D: Dynamics + ?Sized> Search<'d, D> {
                     residual = better;
                 }
                 None if size <= CONVERGED => return self.refuse_undetermined(&linearisation),
-                None => return Err((FailureCause::NoEquilibrium, Some(self.worst(&linearisation, &residual)))),
+                None => return Err(self.contradiction(&linearisation, &residual)),
             }
         }
         let linearisation = self.linearise()?;
         if linearisation.size(&residual) <= CONVERGED {
             return self.refuse_undetermined(&linearisation);
         }
-        Err((FailureCause::NoEquilibrium, Some(self.worst(&linearisation, &residual))))
+        Err(self.contradiction(&linearisation, &residual))
     }
 
     /// A point with a smaller residual, by a full or damped step.
@@ -190,26 +208,40 @@ impl<'d, D: Dynamics + ?Sized> Search<'d, D> {
         None
     }
 
-    /// Component whose equation has the largest scaled residual.
-    fn worst(&self, linearisation: &Linearisation, residual: &[f64]) -> usize {
-        let size = |k: usize| (residual[k] * linearisation.row_factor[k]).abs();
-        let worst = (0..self.rows.len()).max_by(|&a, &b| size(a).total_cmp(&size(b)));
-        worst.map_or(self.unknowns[0], |k| self.rows[k])
+    /// Equations with the largest scaled residuals.
+    fn contradiction(&self, linearisation: &Linearisation, residual: &[f64]) -> Trouble {
+        let sizes: Vec<f64> = residual.iter().zip(&linearisation.row_factor).map(|(r, f)| (r * f).abs()).collect();
+        let worst = (0..sizes.len()).max_by(|&a, &b| sizes[a].total_cmp(&sizes[b])).unwrap_or(0);
+        let equations = (0..sizes.len()).filter(|&k| sizes[k] >= SHARE * sizes[worst]).map(|k| self.rows[k]).collect();
+        Trouble { cause: FailureCause::NoEquilibrium, component: Some(self.rows[worst]), equations }
     }
 
-    fn refuse_undetermined(&self, linearisation: &Linearisation) -> Outcome<()> {
+    fn refuse_undetermined(&mut self, linearisation: &Linearisation) -> Outcome<()> {
         let decomposition = &linearisation.decomposition;
         let rank = decomposition.rank(UNDETERMINED);
         if rank == self.unknowns.len() {
             return Ok(());
         }
         // With fewer equations than unknowns the thin decomposition has no vector for the missing directions.
-        let component = (rank < decomposition.singular_values.len()).then(|| {
-            let direction = decomposition.right(rank);
-            let largest = (0..direction.len()).max_by(|&a, &b| direction[a].abs().total_cmp(&direction[b].abs()));
-            largest.map(|k| self.unknowns[k])
-        });
-        Err((FailureCause::NoEquilibrium, component.flatten()))
+        if rank >= decomposition.singular_values.len() {
+            return Err(Trouble::with(FailureCause::NoEquilibrium, None));
+        }
+        let direction = decomposition.right(rank);
+        let largest = (0..direction.len()).max_by(|&a, &b| direction[a].abs().total_cmp(&direction[b].abs()));
+        let size = largest.map_or(0.0, |k| direction[k].abs());
+        let structure = Structure::new(self.dynamics, self.t, &self.y, &self.zero);
+        let free = (0..direction.len()).filter(|&k| direction[k].abs() >= SHARE * size);
+        let only_multipliers = free.into_iter().all(|k| structure.is_multiplier[self.unknowns[k]]);
+        let component = largest.map(|k| self.unknowns[k]);
+        if !only_multipliers {
+            return Err(Trouble::with(FailureCause::NoEquilibrium, component));
+        }
+        // Rows whose unit vectors the equations do not reach depend on each other.
+        let unreached =
+            |k: usize| 1.0 - (0..rank).map(|j| decomposition.left(j)[k] * decomposition.left(j)[k]).sum::<f64>();
+        let dependent = |k: &usize| structure.is_constraint[self.rows[*k]] && unreached(*k) > SHARE * SHARE;
+        let equations = (0..self.rows.len()).filter(dependent).map(|k| self.rows[k]).collect();
+        Err(Trouble { cause: FailureCause::RedundantConstraints, component, equations })
     }
 
     /// `dF/dy_unknown S_unknown = -(dF/dtheta + dF/dy_known S_known)`.
@@ -239,7 +271,7 @@ impl<'d, D: Dynamics + ?Sized> Search<'d, D> {
             }
         }
         match first_not_finite(&sensitivity) {
-            Some(place) => Err((FailureCause::NotFinite, Some(place % n))),
+            Some(place) => Err(Trouble::with(FailureCause::NotFinite, Some(place % n))),
             None => Ok(sensitivity),
         }
     }

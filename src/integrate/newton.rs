@@ -79,6 +79,10 @@ pub(super) struct Newton {
     is_multiplier: Vec<bool>,
     has_multipliers: bool,
     scaled: Vec<f64>,
+    /// `c dF/dy'` at the last renewal, for [`Newton::filter`]; empty where there is nothing to filter.
+    mass: Vec<f64>,
+    has_hidden_algebraic: bool,
+    filtered: Vec<f64>,
 }
 
 impl Newton {
@@ -92,6 +96,9 @@ impl Newton {
             has_multipliers: system.structure.has_constraints(),
             is_multiplier: system.structure.is_multiplier.clone(),
             scaled: Vec::new(),
+            mass: Vec::new(),
+            has_hidden_algebraic: system.structure.has_hidden_algebraic,
+            filtered: Vec::new(),
         }
     }
 
@@ -125,7 +132,54 @@ impl Newton {
         })?;
         self.leading = Some(end.leading);
         self.rate_factor = CAUTIOUS_RATE;
+        if self.has_hidden_algebraic {
+            self.renew_mass(system, end);
+        }
         Ok(())
+    }
+
+    fn renew_mass<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, end: &StepEnd) {
+        if system.structure.has_unit_mass {
+            let differential = system.dynamics.differential();
+            let places = system.jacobian_rows.iter().zip(&system.jacobian_columns);
+            let unit = |(row, column): (&usize, &usize)| {
+                if row == column && differential[*column] { end.leading } else { 0.0 }
+            };
+            self.mass.clear();
+            self.mass.extend(places.map(unit));
+            return;
+        }
+        self.mass.clone_from(&system.jacobian);
+        system.linearise(end.time, end.y, end.y_prime, 0.0);
+        self.mass.iter_mut().zip(&mut system.jacobian).for_each(|(both, by_y)| {
+            let by_derivative = *both - *by_y;
+            *by_y = std::mem::replace(both, by_derivative);
+        });
+    }
+
+    /// Replaces an error by what it does to the solution, `J^-1 c dF/dy' e`, where some combinations of differential
+    /// components are in fact algebraic. These are found anew in every step, so that their differences say nothing about
+    /// errors; they follow the error of the others (Hairer-Wanner-1996, IV.8).
+    pub fn filter<D: Dynamics + ?Sized>(&mut self, system: &Augmented<D>, error: &mut [f64]) {
+        if !self.has_hidden_algebraic {
+            return;
+        }
+        let n = system.n;
+        let (state, columns) = error.split_at_mut(n);
+        for (part, width) in [(state, 1), (columns, system.p)] {
+            if width == 0 || part.is_empty() {
+                continue;
+            }
+            self.filtered.clear();
+            self.filtered.resize(n * width, 0.0);
+            for ((value, &row), &column) in self.mass.iter().zip(&system.jacobian_rows).zip(&system.jacobian_columns) {
+                for j in 0..width {
+                    self.filtered[row * width + j] += value * part[column * width + j];
+                }
+            }
+            self.factorisation.solve_block(&mut self.filtered, width);
+            part.copy_from_slice(&self.filtered);
+        }
     }
 
     /// Solves from the prediction in `end` and leaves the solution there.
@@ -224,7 +278,7 @@ impl Newton {
     ) -> Result<(), NewtonFailure> {
         for _ in 0..SETTLE_ITERATIONS {
             self.renew_and_correct(system, end)?;
-            if norm.of_correction(&self.delta) * norm.relative() <= SETTLED {
+            if norm.of_whole_correction(&self.delta) * norm.relative() <= SETTLED {
                 break;
             }
         }

@@ -164,6 +164,12 @@ impl ErrorNorm {
         finite_root(sum / self.n as f64)
     }
 
+    /// As [`ErrorNorm::of_correction`], multipliers included.
+    pub fn of_whole_correction(&self, correction: &[f64]) -> f64 {
+        let sum: f64 = correction[..self.n].iter().zip(&self.inverse_weight).map(|(e, w)| (e * w) * (e * w)).sum();
+        finite_root(sum / self.n as f64)
+    }
+
     /// Size of an error of the state and of the sensitivities under control.
     pub fn of(&mut self, error: &[f64]) -> Size {
         let state = self.of_state(error);

@@ -66,7 +66,7 @@ struct Stage {
 /// multipliers form a class; constraints that touch a single class come first and settle it, the others follow.
 fn stages<D: Dynamics + ?Sized>(system: &mut Augmented<D>, t: f64, y: &[f64], fixed: &[bool]) -> Vec<Stage> {
     let n = system.n;
-    let (by_y, _) = entries(system.dynamics, t, y, &vec![0.0; n]);
+    let by_y = entries(system.dynamics, t, y, &vec![0.0; n]).by_y;
     let structure = &system.structure;
     // Rate of differential component i is in row i or in another row; either way the row joins its components' classes.
     let mut class: Vec<usize> = (0..n).collect();
@@ -293,7 +293,7 @@ impl<'s, 'd, D: Dynamics + ?Sized> Projection<'s, 'd, D> {
         let distance: Vec<f64> = columns.iter().map(|&i| (y[i] - given[i]) / self.scale[i]).collect();
         let bend = self.bend(y, &linearised.multipliers(&distance), s)?;
         for j in 0..p {
-            let right: Vec<f64> = self.stage.rows.iter().map(|&row| -of_constraints[row * p + j]).collect();
+            let right: Vec<f64> = self.stage.rows.iter().map(|&row| of_constraints[row * p + j]).collect();
             let mut target: Vec<f64> = columns.iter().map(|&i| original[i * p + j]).collect();
             let base = target.clone();
             for _ in 0..MAXIMUM_ITERATIONS {

@@ -5,6 +5,8 @@ use super::problem::Dynamics;
 
 /// Shift, in typical magnitudes, to a second point: entries that vanish at the first one by chance show there.
 const SHIFT: f64 = 0.0137;
+/// Rounding of a factor that is one.
+const UNIT: f64 = 1e-9;
 
 /// In a Hessenberg system of index 2 (`x' = f(t, x, w)`, `0 = c(t, x)`) the rows `c` and the components `w`; both empty
 /// in systems of index 0 and 1 (Brenan-Campbell-Petzold-1996, 2.2).
@@ -16,19 +18,27 @@ pub(super) struct Structure {
     pub constraints: Vec<usize>,
     /// Algebraic components that stand in no algebraic equation, length n.
     pub is_multiplier: Vec<bool>,
+    /// Some combinations of differential components are in fact algebraic: constraints tie them together, or derivatives
+    /// stand in rows of other components.
+    pub has_hidden_algebraic: bool,
+    /// Every derivative stands with factor one in the row of its own component, and nowhere else.
+    pub has_unit_mass: bool,
 }
 
 impl Structure {
     pub fn new<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64], y_prime: &[f64]) -> Self {
         let n = y.len();
-        let mut structure = Self { is_constraint: vec![false; n], constraints: vec![], is_multiplier: vec![false; n] };
+        let mut structure = Self { is_constraint: vec![false; n], is_multiplier: vec![false; n], ..Self::default() };
         let differential = dynamics.differential().to_vec();
+        let Entries { by_y, by_derivative } = entries(dynamics, t, y, y_prime);
+        let is_unit = |&(row, column, value): &(usize, usize, f64)| row == column && (value - 1.0).abs() < UNIT;
+        structure.has_unit_mass = by_derivative.iter().all(is_unit);
+        structure.has_hidden_algebraic = by_derivative.iter().any(|(row, column, _)| row != column);
         if differential.iter().all(|d| *d) {
             return structure;
         }
-        let (by_y, by_derivative) = entries(dynamics, t, y, y_prime);
         let mut has_derivative = vec![false; n];
-        by_derivative.iter().for_each(|&(row, _)| has_derivative[row] = true);
+        by_derivative.iter().for_each(|&(row, ..)| has_derivative[row] = true);
         let mut has_algebraic = vec![false; n];
         let mut in_algebraic_equation = vec![false; n];
         for &(row, column) in by_y.iter().filter(|(_, column)| !differential[*column]) {
@@ -38,6 +48,7 @@ impl Structure {
         structure.is_constraint = (0..n).map(|row| !has_derivative[row] && !has_algebraic[row]).collect();
         structure.constraints = (0..n).filter(|&row| structure.is_constraint[row]).collect();
         if !structure.constraints.is_empty() {
+            structure.has_hidden_algebraic = true;
             structure.is_multiplier = (0..n).map(|i| !differential[i] && !in_algebraic_equation[i]).collect();
         }
         structure
@@ -48,17 +59,20 @@ impl Structure {
     }
 }
 
-type Places = Vec<(usize, usize)>;
+/// Places of the entries of dF/dy and of dF/dy' (with their values) that differ from zero at or near a point.
+pub(super) struct Entries {
+    pub by_y: Vec<(usize, usize)>,
+    by_derivative: Vec<(usize, usize, f64)>,
+}
 
-/// Places of the entries of dF/dy and of dF/dy' that differ from zero at or near a point.
-pub(super) fn entries<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64], y_prime: &[f64]) -> (Places, Places) {
+pub(super) fn entries<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64], y_prime: &[f64]) -> Entries {
     let shifted: Vec<f64> = y
         .iter()
         .zip(dynamics.scale())
         .enumerate()
         .map(|(i, (y, scale))| y + SHIFT * scale * (1.0 + (i % 7) as f64 / 7.0))
         .collect();
-    let places: Places = dynamics.pattern().entries().collect();
+    let places: Vec<(usize, usize)> = dynamics.pattern().entries().collect();
     let (mut by_y, mut by_derivative) = (Vec::new(), Vec::new());
     let (mut values, mut both) = (vec![0.0; places.len()], vec![0.0; places.len()]);
     for point in [y, &shifted] {
@@ -68,7 +82,7 @@ pub(super) fn entries<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64],
         dynamics.jacobian(t, point, y_prime, c, &mut both);
         by_y.extend(places.iter().zip(&values).filter(|(_, v)| **v != 0.0).map(|(place, _)| *place));
         let differing = places.iter().zip(values.iter().zip(&both)).filter(|(_, (a, b))| a != b);
-        by_derivative.extend(differing.map(|(place, _)| *place));
+        by_derivative.extend(differing.map(|(&(row, column), (a, b))| (row, column, (b - a) / c)));
     }
-    (by_y, by_derivative)
+    Entries { by_y, by_derivative }
 }

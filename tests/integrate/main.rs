@@ -2,6 +2,8 @@
 
 mod equilibrium;
 mod failures;
+mod loops;
+mod mechanisms;
 mod orders;
 mod problems;
 mod references;
