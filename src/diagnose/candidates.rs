@@ -133,8 +133,7 @@ fn aliases(study: &Study, effect: &EffectDeclaration, place: &Place) -> Vec<Stri
     if place.kind != PlaceKind::Joint {
         return Vec::new();
     }
-    let joint = study.joints.iter().position(|joint| joint.name == place.name);
-    let same = |force: &&crate::study::Force| matches!((force.place, joint), (ForcePlace::Joint(a), Some(b)) if a == b);
+    let same = |force: &&crate::study::Force| study.axis_of(force).is_some_and(|axis| axis.name == place.name);
     let fitting =
         |force: &&crate::study::Force| study.places.iter().any(|other| other.name == force.name && effect.fits(other));
     study.forces.iter().filter(same).filter(fitting).map(|force| format!("{} at {}", effect.name, force.name)).collect()
@@ -143,7 +142,7 @@ fn aliases(study: &Study, effect: &EffectDeclaration, place: &Place) -> Vec<Stri
 /// What an effect adds at a force element on a joint it adds at the joint itself; effects known at both are tried once.
 fn stands_at_joint(study: &Study, effect: &EffectDeclaration, place: &Place) -> bool {
     let on_joint =
-        study.forces.iter().any(|force| force.name == place.name && matches!(force.place, ForcePlace::Joint(_)));
+        study.forces.iter().any(|force| force.name == place.name && matches!(force.place, ForcePlace::Joint { .. }));
     on_joint && effect.kinds.contains(&PlaceKind::Joint)
 }
 

@@ -128,8 +128,12 @@ fn with_free_force(study: &Study, place: &Place, knots: &[f64]) -> Option<(Study
 fn force_place(study: &Study, place: &Place) -> Option<ForcePlace> {
     match place.kind {
         PlaceKind::Joint => {
-            let index = study.joints.iter().position(|joint| joint.name == place.name)?;
-            study.joints[index].coordinate.map(|_| ForcePlace::Joint(index))
+            let axes = study.joints.iter().enumerate();
+            axes.flat_map(|(joint, declared)| {
+                declared.axes.iter().enumerate().map(move |(axis, entry)| (joint, axis, entry))
+            })
+            .find(|(.., entry)| entry.name == place.name)
+            .map(|(joint, axis, _)| ForcePlace::Joint { joint, axis })
         }
         _ => study.forces.iter().find(|force| force.name == place.name).map(|force| force.place),
     }
@@ -233,7 +237,9 @@ fn explained(source: &Source, record: &Record, place: &Place) -> Option<Vec<f64>
 /// Effects at a joint are force elements on that joint; effects at an element change that element's load.
 fn same_place(force: &Force, place: &Place, wanted: &ForcePlace) -> bool {
     match (place.kind, &force.place, wanted) {
-        (PlaceKind::Joint, ForcePlace::Joint(a), ForcePlace::Joint(b)) => a == b,
+        (PlaceKind::Joint, ForcePlace::Joint { joint: a, axis: at_a }, ForcePlace::Joint { joint: b, axis: at_b }) => {
+            (a, at_a) == (b, at_b)
+        }
         _ => force.name == place.name,
     }
 }

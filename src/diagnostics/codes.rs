@@ -264,8 +264,10 @@ codes! {
     "Every body needs a chain of joints that leads to `ground`; otherwise its motion has no coordinates. A body that may move\n\
      along one axis only needs `joint guide: prismatic(z) ground -> body`.\n"
 
-    CLOSED_LOOP "E0302" "joints close a loop"
-    "The joint connects two bodies that other joints connect already. Joints must form a tree.\n"
+    CLOSED_LOOP "E0302" "joint cannot close its loop"
+    "Joints form loops; the tool lets all but one of them carry bodies and turns the last into constraints. Joints that carry force\n\
+     elements are kept, then those with the least freedom; among equals the last one declared closes the loop. A joint whose motion\n\
+     is prescribed, or whose shifts stand behind turns, cannot be the one that closes: declare it earlier.\n"
 
     NO_INERTIA "E0303" "joint moves no inertia"
     "The acceleration of a coordinate is its load divided by the inertia that moves with it. A joint whose outer bodies have no\n\
@@ -288,6 +290,19 @@ codes! {
 
     FORCE_ON_FIXED_JOINT "E0308" "force on a joint that cannot move"
     "A force element on a joint acts along or about the joint's axis. A fixed joint has none.\n"
+
+    REDUNDANT_CONSTRAINT "E0309" "constraint holds what others hold already"
+    "A closed loop of revolute joints in space is held several times over: in a planar four-bar linkage each joint keeps the bodies in\n\
+     their plane. The motion is not affected, but the reactions in these directions cannot be determined by mechanics of rigid\n\
+     bodies (in the real machine they depend on clearances and flexibility). The tool drops such constraints, says so, and names the\n\
+     joint that would do without them.\n"
+
+    CANNOT_MOVE "E0310" "mechanism cannot move"
+    "The loops take away as many freedoms as the joints give. Count: every body has six, a joint takes those it does not leave free.\n"
+
+    CANNOT_ASSEMBLE "E0311" "loop cannot be assembled"
+    "Near the start no position of the bodies closes all loops. Either a length is wrong (the sides of a four-bar that is too long to\n\
+     reach), or the start is too far away: give the joints' positions in `start`.\n"
 
     // ---- E04xx: data files and signals ----
 

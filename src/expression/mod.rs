@@ -14,6 +14,7 @@ mod print;
 #[cfg(test)]
 mod properties;
 mod simplify;
+pub(crate) mod vector;
 
 pub use differentiate::Entry;
 pub use graph::{Binary, Graph, Node, Operation, Symbol, Unary};

@@ -1,8 +1,8 @@
 //! Accelerations by the articulated-body algorithm on expressions (Featherstone-2008, table 7.1).
 
 use super::kinematics::{FrameMotion, SpatialMotion, carry, motion_axis};
-use super::topology::Tree;
-use super::vector::{self, Matrix, Vector};
+use super::topology::{Coordinate, Link, Seat, Tree};
+use crate::expression::vector::{self, Matrix, Vector};
 use crate::expression::{Graph, Node};
 use crate::study::{Body, Study};
 
@@ -45,14 +45,14 @@ impl Wrench {
     }
 
     /// Power on a motion (angular, linear).
-    fn on(self, graph: &mut Graph, motion: (Vector, Vector)) -> Node {
+    pub fn on(self, graph: &mut Graph, motion: (Vector, Vector)) -> Node {
         let turning = vector::dot(graph, self.moment, motion.0);
         let shifting = vector::dot(graph, self.force, motion.1);
         graph.add(turning, shifting)
     }
 
     /// The same load about the predecessor's origin in its axes.
-    fn carried_back(self, graph: &mut Graph, frame: &FrameMotion) -> Wrench {
+    pub fn carried_back(self, graph: &mut Graph, frame: &FrameMotion) -> Wrench {
         let force = vector::apply(graph, frame.rotation, self.force);
         let moment = vector::apply(graph, frame.rotation, self.moment);
         let lever = vector::cross(graph, frame.shift, force);
@@ -139,11 +139,13 @@ fn ratio(graph: &mut Graph, along: Wrench, divisor: Node) -> Wrench {
     Wrench { moment: ratio(along.moment), force: ratio(along.force) }
 }
 
-/// Inertia of a body about `origin` (its own origin at `offset` from there), parallel axes.
-fn body_inertia(graph: &mut Graph, body: &Body, offset: Vector) -> Inertia {
+/// Inertia of a body about the origin of the link it sits on, in the link's axes.
+fn body_inertia(graph: &mut Graph, body: &Body, seat: Seat) -> Inertia {
     let [xx, yy, zz, xy, xz, yz] = body.inertia;
     let central = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
-    let lever = vector::add(graph, offset, body.centre_of_gravity);
+    let central = vector::turn_symmetric(graph, seat.rotation, central);
+    let arm = vector::apply(graph, seat.rotation, body.centre_of_gravity);
+    let lever = vector::add(graph, seat.offset, arm);
     let moment = vector::scale(graph, body.mass, lever);
     let coupling = vector::skew(graph, moment);
     let arm = vector::skew(graph, lever);
@@ -161,7 +163,7 @@ pub(super) fn link_inertias(graph: &mut Graph, study: &Study, tree: &Tree) -> Ve
         .map(|link| {
             let mut sum = Inertia::zero(graph);
             for &body in &link.bodies {
-                let own = body_inertia(graph, &study.bodies[body], tree.seats[body].offset);
+                let own = body_inertia(graph, &study.bodies[body], tree.seats[body]);
                 sum = sum.add(graph, own);
             }
             sum
@@ -174,6 +176,8 @@ pub(super) fn link_inertias(graph: &mut Graph, study: &Study, tree: &Tree) -> Ve
 pub(super) struct Accelerated {
     /// Second derivative of the coordinate.
     pub acceleration: Node,
+    /// What is transmitted to the link from its predecessor, about the link's origin in its axes.
+    pub transmitted: Wrench,
     /// S^T I^A S: what the joint has to move, the outer joints free. Zero: the acceleration is undetermined.
     pub moved_inertia: Node,
     /// Diagonal of I^A, rotational and translational: what `moved_inertia` is a projection of.
@@ -210,11 +214,24 @@ pub(super) fn articulated_bodies(
         along.push(u);
         moved.push((divisor, driving));
         if let Some(p) = tree.links[i].predecessor {
-            let scaled = ratio(graph, u, divisor);
-            let reduced = inertia[i].without(graph, u, scaled);
-            let by_bias = reduced.apply(graph, (frame.angular_bias, frame.bias));
-            let by_drive = scaled.scale(graph, driving);
-            let total = bias[i].add(graph, by_bias).add(graph, by_drive).carried_back(graph, frame);
+            let (reduced, total) = match given_acceleration(graph, &tree.links[i]) {
+                Some(given) => {
+                    let angular = vector::scale(graph, given, axes[i].0);
+                    let linear = vector::scale(graph, given, axes[i].1);
+                    let angular = vector::add(graph, frame.angular_bias, angular);
+                    let linear = vector::add(graph, frame.bias, linear);
+                    let by_bias = inertia[i].apply(graph, (angular, linear));
+                    (inertia[i], bias[i].add(graph, by_bias))
+                }
+                None => {
+                    let scaled = ratio(graph, u, divisor);
+                    let reduced = inertia[i].without(graph, u, scaled);
+                    let by_bias = reduced.apply(graph, (frame.angular_bias, frame.bias));
+                    let by_drive = scaled.scale(graph, driving);
+                    (reduced, bias[i].add(graph, by_bias).add(graph, by_drive))
+                }
+            };
+            let total = total.carried_back(graph, frame);
             let carried = reduced.carried_back(graph, frame);
             inertia[p] = inertia[p].add(graph, carried);
             bias[p] = bias[p].add(graph, total);
@@ -233,19 +250,35 @@ pub(super) fn articulated_bodies(
         let angular = vector::add(graph, angular, frame.angular_bias);
         let linear = vector::add(graph, linear, frame.bias);
         let (divisor, driving) = moved[i];
-        let carried = along[i].on(graph, (angular, linear));
-        let rest = graph.subtract(driving, carried);
-        let acceleration = graph.divide(rest, divisor);
+        let acceleration = match given_acceleration(graph, &tree.links[i]) {
+            Some(given) => given,
+            None => {
+                let carried = along[i].on(graph, (angular, linear));
+                let rest = graph.subtract(driving, carried);
+                graph.divide(rest, divisor)
+            }
+        };
         let (turning, shifting) = axes[i];
         let turning = vector::scale(graph, acceleration, turning);
         let shifting = vector::scale(graph, acceleration, shifting);
-        spatial.push(SpatialMotion {
+        let motion = SpatialMotion {
             angular: vector::add(graph, angular, turning),
             linear: vector::add(graph, linear, shifting),
-        });
-        result.push(Accelerated { acceleration, moved_inertia: divisor, around: inertia[i].diagonals() });
+        };
+        let transmitted = inertia[i].apply(graph, (motion.angular, motion.linear)).add(graph, bias[i]);
+        spatial.push(motion);
+        result.push(Accelerated { acceleration, transmitted, moved_inertia: divisor, around: inertia[i].diagonals() });
     }
     result
+}
+
+/// The acceleration of a motion that is prescribed.
+fn given_acceleration(graph: &mut Graph, link: &Link) -> Option<Node> {
+    match link.coordinate {
+        Coordinate::Prescribed { motion, .. } => Some(motion[2]),
+        Coordinate::Weld => Some(graph.constant(0.0)),
+        Coordinate::Free { .. } | Coordinate::Rotation { .. } => None,
+    }
 }
 
 /// v x* (I v): centrifugal and gyroscopic load.

@@ -4,7 +4,7 @@ use super::system::{StartEquation, System};
 use super::topology::{Tree, spanning_tree};
 use crate::diagnostics::Diagnostic;
 use crate::expression::{Graph, Node, Printer};
-use crate::study::{Attachment, Force, ForcePlace, JointKind, StartBase, Study};
+use crate::study::{Attachment, AxisMotion, Force, ForcePlace, Joint, JointKind, Motion, StartBase, Study};
 use std::fmt::Write;
 
 /// The spanning tree: ground, joints with their coordinates, bodies.
@@ -17,9 +17,20 @@ pub fn emit_tree(study: &Study) -> Result<String, Vec<Diagnostic>> {
     let tree = spanning_tree(study, &mut graph)?;
     let mut text = format!("tree {} ({})\nground\n", study.name, study.variant);
     branches(&mut text, study, &tree, None, 1);
-    let moving = tree.links.len();
-    let _ =
-        writeln!(text, "\n{} bodies, {} joints, {moving} degrees of freedom", study.bodies.len(), study.joints.len());
+    let moving = tree.links.iter().filter(|link| link.free_symbols().is_some()).count();
+    for joint in study.joints.iter().filter(|joint| joint.closes_loop) {
+        let ends =
+            [&joint.parent, &joint.child].map(|end| end.body.map_or("ground", |body| study.bodies[body].name.as_str()));
+        let _ = writeln!(text, "loop closed by {}: {} {} -> {}", joint.name, kind_text(joint), ends[0], ends[1]);
+    }
+    let closing = study.joints.iter().filter(|joint| joint.closes_loop).count();
+    let loops = if closing == 0 { String::new() } else { format!(" of the tree, {closing} closed loops") };
+    let _ = writeln!(
+        text,
+        "\n{} bodies, {} joints, {moving} degrees of freedom{loops}",
+        study.bodies.len(),
+        study.joints.len()
+    );
     Ok(text)
 }
 
@@ -33,29 +44,53 @@ fn branches(text: &mut String, study: &Study, tree: &Tree, on: Option<usize>, de
             continue;
         }
         let note = if is_reversed { "  (declared from this body)" } else { "" };
-        let coordinate = joint.coordinate.map_or(String::new(), |_| format!("  [{}.position]", joint.name));
+        let mut coordinates: Vec<String> = joint.axes.iter().map(|axis| format!("{}.position", axis.name)).collect();
+        coordinates.extend(joint.rotation.map(|_| format!("{}.quaternion", joint.name)));
+        let coordinate = if coordinates.is_empty() { String::new() } else { format!("  [{}]", coordinates.join(", ")) };
         let _ = writeln!(
             text,
             "{}{} <- {}: {}{coordinate}{note}",
             "  ".repeat(depth),
             study.bodies[body].name,
             joint.name,
-            kind_text(joint.kind)
+            kind_text(joint)
         );
         branches(text, study, tree, Some(body), depth + 1);
     }
 }
 
-fn kind_text(kind: JointKind) -> String {
-    match kind {
+/// As the study writes it.
+fn kind_text(joint: &Joint) -> String {
+    let axis = |at: usize| joint.axes.get(at).map_or(String::new(), |axis| axis_in_list(axis.motion.direction()));
+    let single = |at: usize| joint.axes.get(at).map_or(String::new(), |axis| axis_text(axis.motion.direction()));
+    match joint.kind {
         JointKind::Fixed => "fixed".into(),
-        JointKind::Prismatic { axis } => format!("prismatic({})", axis_text(axis)),
-        JointKind::Revolute { axis } => format!("revolute({})", axis_text(axis)),
+        JointKind::Spherical => "spherical".into(),
+        JointKind::Free => "free".into(),
+        JointKind::Distance => "distance".into(),
+        JointKind::Prismatic => format!("prismatic({})", single(0)),
+        JointKind::Revolute => format!("revolute({})", single(0)),
+        JointKind::Cylindrical => format!("cylindrical({})", single(0)),
+        JointKind::Planar => format!("planar({})", single(2)),
+        JointKind::Universal => format!("universal({}, {})", axis(0), axis(1)),
+        JointKind::Axes => {
+            let words = joint.axes.iter().map(|axis| match axis.motion {
+                AxisMotion::Shift(direction) => format!("shift {}", axis_in_list(direction)),
+                AxisMotion::Turn(direction) => format!("turn {}", axis_in_list(direction)),
+            });
+            format!("axes({})", words.collect::<Vec<_>>().join(", "))
+        }
     }
 }
 
+/// As [`axis_text`], components in parentheses.
+pub(super) fn axis_in_list(axis: [f64; 3]) -> String {
+    let text = axis_text(axis);
+    if text.contains(',') { format!("({text})") } else { text }
+}
+
 /// `x`, `-z`, or components.
-fn axis_text(axis: [f64; 3]) -> String {
+pub(super) fn axis_text(axis: [f64; 3]) -> String {
     for (i, name) in ["x", "y", "z"].into_iter().enumerate() {
         let others_vanish = (0..3).all(|j| j == i || axis[j] == 0.0);
         if others_vanish && axis[i].abs() == 1.0 {
@@ -93,7 +128,19 @@ pub fn emit_model(study: &Study, system: &System) -> String {
     }
     for joint in &study.joints {
         let ends = [&joint.parent, &joint.child].map(|end| attachment_text(study, &printer, end));
-        let _ = writeln!(text, "joint {}: {} {} -> {}", joint.name, kind_text(joint.kind), ends[0], ends[1]);
+        let _ = writeln!(text, "joint {}: {} {} -> {}", joint.name, kind_text(joint), ends[0], ends[1]);
+        if let Some(matrix) = joint.orientation {
+            let rows: Vec<String> = matrix.iter().map(|row| vector_text(&printer, row)).collect();
+            let _ = writeln!(text, "  orientation {}", rows.join(" "));
+        }
+        if let Some(length) = joint.length {
+            let _ = writeln!(text, "  length {}", printer.text(length));
+        }
+        for axis in &joint.axes {
+            if let Some(motion) = axis.prescribed {
+                let _ = writeln!(text, "  {} = {}", axis.name, printer.text(motion));
+            }
+        }
     }
     for force in &study.forces {
         force_text(&mut text, study, &printer, force);
@@ -138,11 +185,13 @@ pub fn emit_model(study: &Study, system: &System) -> String {
 fn force_text(text: &mut String, study: &Study, printer: &Printer, force: &Force) {
     let kind = if force.is_actuator { "actuator" } else { "force" };
     let place = match &force.place {
-        ForcePlace::Joint(joint) => format!("on {}", study.joints[*joint].name),
+        ForcePlace::Joint { joint, axis } => format!("on {}", study.joints[*joint].axes[*axis].name),
         ForcePlace::Between { first, second, along, free_length } => {
             let mut place = [first, second].map(|end| attachment_text(study, printer, end)).join(" -> ");
-            if let Some(axis) = along {
-                let _ = write!(place, " along {}", axis_text(*axis));
+            if let Some(direction) = along {
+                let word = if direction.motion == Motion::Rotational { "about" } else { "along" };
+                let of = direction.body.map_or(String::new(), |body| format!(" of {}", study.bodies[body].name));
+                let _ = write!(place, " {word} {}{of}", axis_text(direction.axis));
             }
             if let Some(length) = free_length {
                 let _ = write!(place, " free length {}", printer.text(*length));

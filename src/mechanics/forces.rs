@@ -2,11 +2,12 @@
 
 use super::articulated::Wrench;
 use super::kinematics::{self, FrameMotion};
-use super::topology::{Seat, Tree};
-use super::vector::{self, Vector};
+use super::loops;
+use super::topology::{Coordinate, Seat, Tree};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::expression::{Graph, Node};
-use crate::study::{Force, ForcePlace, Study};
+use crate::expression::vector::{self, Matrix, Vector};
+use crate::expression::{Binary, Graph, Node};
+use crate::study::{Force, ForceDirection, ForcePlace, Motion, Study};
 
 /// Geometry of one force element.
 #[derive(Clone, Debug)]
@@ -33,11 +34,18 @@ pub(super) fn geometry(
     force: &Force,
 ) -> Result<ForceGeometry, Diagnostic> {
     match &force.place {
-        ForcePlace::Joint(joint) => at_joint(graph, study, tree, force, *joint),
+        ForcePlace::Joint { joint, axis } if study.joints[*joint].closes_loop => {
+            loops::at_closing_joint(graph, study, tree, frames, force, (*joint, *axis))
+        }
+        ForcePlace::Joint { joint, axis } => at_joint(graph, study, tree, force, (*joint, *axis)),
         ForcePlace::Between { first, second, along, free_length } => {
             let ends = [tree.place(graph, first), tree.place(graph, second)];
             match along {
-                Some(axis) => Ok(along_axis(graph, frames, ends, *axis)),
+                Some(direction) if direction.motion == Motion::Rotational => {
+                    Ok(about_axis(graph, tree, frames, [first.body, second.body], *direction))
+                }
+                Some(ForceDirection { axis, body: None, .. }) => Ok(along_axis(graph, frames, ends, *axis)),
+                Some(direction) => Ok(along_body_axis(graph, tree, frames, ends, *direction)),
                 None => between_points(graph, frames, ends, *free_length, force),
             }
         }
@@ -49,9 +57,9 @@ fn at_joint(
     study: &Study,
     tree: &Tree,
     force: &Force,
-    joint: usize,
+    (joint, axis): (usize, usize),
 ) -> Result<ForceGeometry, Diagnostic> {
-    let Some(link) = tree.link_of_joint[joint] else {
+    let Some(link) = tree.link_of_axis(joint, axis) else {
         let joint = &study.joints[joint];
         let message = format!("force `{}` acts on joint `{}`, which cannot move", force.name, joint.name);
         return Err(Diagnostic::error(Code::FORCE_ON_FIXED_JOINT, message)
@@ -59,12 +67,109 @@ fn at_joint(
             .secondary(joint.span, "fixed here")
             .help("attach the force to a joint that can move, or between two bodies"));
     };
-    let symbols = tree.links[link].symbols;
-    Ok(ForceGeometry {
-        coordinate: graph.variable(symbols.position),
-        rate: graph.variable(symbols.velocity),
-        effect: Effect::Coordinate(link),
-    })
+    let (coordinate, rate) = match tree.links[link].coordinate {
+        Coordinate::Prescribed { motion, .. } => (motion[0], motion[1]),
+        _ => {
+            let symbols = study.joints[joint].axes[axis].symbols;
+            (graph.variable(symbols.position), graph.variable(symbols.velocity))
+        }
+    };
+    Ok(ForceGeometry { coordinate, rate, effect: Effect::Coordinate(link) })
+}
+
+/// Signed displacement of the second point against the first along an axis that turns with a body. The load acts at the
+/// second point on both bodies, so that power is load times rate.
+fn along_body_axis(
+    graph: &mut Graph,
+    tree: &Tree,
+    frames: &[FrameMotion],
+    ends: [Seat; 2],
+    direction: ForceDirection,
+) -> ForceGeometry {
+    let (axis, link) = turning_axis(graph, tree, frames, direction);
+    let [first, second] = ends.map(|end| kinematics::point_position(graph, frames, end));
+    let relative = vector::subtract(graph, second, first);
+    let reference = {
+        let [first, second] = ends.map(|end| kinematics::point_reference(graph, frames, end));
+        let drawn = vector::subtract(graph, second, first);
+        let seat = tree.seat(graph, direction.body);
+        let axis = vector::constant(graph, direction.axis);
+        let drawn_axis = vector::apply(graph, seat.rotation, axis);
+        vector::dot(graph, drawn_axis, drawn)
+    };
+    let length = vector::dot(graph, axis, relative);
+    let coordinate = graph.subtract(length, reference);
+    let along = relative_rate(graph, frames, ends, axis);
+    let angular = kinematics::angular_velocity(graph, frames, link);
+    let turning = vector::cross(graph, angular, axis);
+    let by_turning = vector::dot(graph, turning, relative);
+    let rate = graph.add(along, by_turning);
+    // What the turning of the axis contributes to the rate is a moment on the body that carries it.
+    let mut wrenches = match pulling(graph, frames, ends, axis) {
+        Effect::Links(wrenches) => wrenches,
+        Effect::Coordinate(_) => Vec::new(),
+    };
+    if let Some(link) = link {
+        let moment = vector::cross(graph, axis, relative);
+        let moment = vector::apply_transposed(graph, frames[link].orientation, moment);
+        wrenches.push((link, Wrench { moment, force: vector::zero(graph) }));
+    }
+    ForceGeometry { coordinate, rate, effect: Effect::Links(wrenches) }
+}
+
+/// The axis in ground axes and the link it turns with.
+fn turning_axis(
+    graph: &mut Graph,
+    tree: &Tree,
+    frames: &[FrameMotion],
+    direction: ForceDirection,
+) -> (Vector, Option<usize>) {
+    let seat = tree.seat(graph, direction.body);
+    let axis = vector::constant(graph, direction.axis);
+    let axis = vector::apply(graph, seat.rotation, axis);
+    let orientation = kinematics::orientation(graph, frames, seat.link);
+    (vector::apply(graph, orientation, axis), seat.link)
+}
+
+/// Angle of the second body against the first about an axis: that between the projections of a direction that is
+/// perpendicular to the axis and parallel in both bodies in the reference configuration.
+fn about_axis(
+    graph: &mut Graph,
+    tree: &Tree,
+    frames: &[FrameMotion],
+    bodies: [Option<usize>; 2],
+    direction: ForceDirection,
+) -> ForceGeometry {
+    let (axis, _) = turning_axis(graph, tree, frames, direction);
+    let seat = tree.seat(graph, direction.body);
+    let [across, beyond] = vector::perpendicular(direction.axis).map(|v| {
+        let v = vector::constant(graph, v);
+        vector::apply(graph, seat.rotation, v)
+    });
+    let links = bodies.map(|body| tree.seat(graph, body).link);
+    let [first, second] = links.map(|link| kinematics::orientation(graph, frames, link));
+    let carrier = kinematics::orientation(graph, frames, seat.link);
+    let angle_of = |graph: &mut Graph, orientation: Matrix| {
+        let turned = vector::apply(graph, orientation, across);
+        let [x, y] = [across, beyond].map(|v| {
+            let v = vector::apply(graph, carrier, v);
+            vector::dot(graph, v, turned)
+        });
+        graph.binary(Binary::Atan2, y, x)
+    };
+    let angles = [first, second].map(|orientation| angle_of(graph, orientation));
+    let coordinate = graph.subtract(angles[1], angles[0]);
+    let [slow, fast] = links.map(|link| kinematics::angular_velocity(graph, frames, link));
+    let relative = vector::subtract(graph, fast, slow);
+    let rate = vector::dot(graph, axis, relative);
+    let reversed = vector::negate(graph, axis);
+    let mut wrenches = Vec::new();
+    for (link, moment) in links.into_iter().zip([reversed, axis]) {
+        let Some(link) = link.filter(|_| links[0] != links[1]) else { continue };
+        let moment = vector::apply_transposed(graph, frames[link].orientation, moment);
+        wrenches.push((link, Wrench { moment, force: vector::zero(graph) }));
+    }
+    ForceGeometry { coordinate, rate, effect: Effect::Links(wrenches) }
 }
 
 /// Signed displacement of the second point against the first along a ground-fixed axis.

@@ -1,7 +1,7 @@
 //! Positions, velocities and accelerations of frames and points, from ground outwards (Featherstone-2008, chapter 4).
 
-use super::topology::{Axis, Link, Seat, Tree};
-use super::vector::{self, Matrix, Vector};
+use super::topology::{Axis, Coordinate, Link, Seat, Tree};
+use crate::expression::vector::{self, Matrix, Vector};
 use crate::expression::{Graph, Node};
 
 /// Motion of one link's frame. Vectors are in the link's axes unless stated.
@@ -37,8 +37,40 @@ pub(super) struct SpatialMotion {
 pub(super) fn motion_axis(graph: &mut Graph, axis: Axis) -> (Vector, Vector) {
     let zero = vector::zero(graph);
     match axis {
-        Axis::Turn(a) => (vector::constant(graph, a), zero),
-        Axis::Shift(a) => (zero, vector::constant(graph, a)),
+        Axis::Turn(a) => (a, zero),
+        Axis::Shift(a) => (zero, a),
+    }
+}
+
+/// Rotation of a link's frame against its predecessor's, and how far it is shifted.
+fn relative_placement(graph: &mut Graph, link: &Link) -> (Matrix, Vector) {
+    let position = match link.coordinate {
+        Coordinate::Free { symbols, .. } => graph.variable(symbols.position),
+        Coordinate::Prescribed { motion, .. } => motion[0],
+        Coordinate::Rotation { symbols, component: 0 } => {
+            let quaternion = symbols.quaternion.map(|symbol| graph.variable(symbol));
+            return (vector::rotation_of_quaternion(graph, quaternion), vector::zero(graph));
+        }
+        Coordinate::Rotation { .. } | Coordinate::Weld => return (vector::identity(graph), vector::zero(graph)),
+    };
+    match link.axis {
+        Axis::Turn(axis) => (vector::rotation(graph, axis, position), vector::zero(graph)),
+        Axis::Shift(axis) => (vector::identity(graph), vector::scale(graph, position, axis)),
+    }
+}
+
+/// The relative velocity (angular, linear) with which the bias of a link arises: its own, but for a free rotation, whose
+/// three components turn with the frame together, the first takes all and the others nothing.
+fn rate_in_bias(graph: &mut Graph, link: &Link) -> (Vector, Vector) {
+    let zero = vector::zero(graph);
+    match link.coordinate {
+        Coordinate::Rotation { symbols, component: 0 } => (symbols.velocity.map(|s| graph.variable(s)), zero),
+        Coordinate::Rotation { .. } | Coordinate::Weld => (zero, zero),
+        Coordinate::Free { .. } | Coordinate::Prescribed { .. } => {
+            let rate = link.rate(graph);
+            let (turning, shifting) = motion_axis(graph, link.axis);
+            (vector::scale(graph, rate, turning), vector::scale(graph, rate, shifting))
+        }
     }
 }
 
@@ -53,14 +85,9 @@ pub(super) fn motion(graph: &mut Graph, tree: &Tree) -> Vec<FrameMotion> {
 }
 
 fn frame_motion(graph: &mut Graph, link: &Link, predecessor: Option<&FrameMotion>) -> FrameMotion {
-    let coordinate = graph.variable(link.symbols.position);
-    let rate = graph.variable(link.symbols.velocity);
+    let rate = link.rate(graph);
     let (turning, shifting) = motion_axis(graph, link.axis);
-    let rotation = match link.axis {
-        Axis::Turn(axis) => vector::rotation(graph, axis, coordinate),
-        Axis::Shift(_) => vector::identity(graph),
-    };
-    let travel = vector::scale(graph, coordinate, shifting);
+    let (rotation, travel) = relative_placement(graph, link);
     let shift = vector::add(graph, link.offset, travel);
     let joint_angular = vector::scale(graph, rate, turning);
     let joint_linear = vector::scale(graph, rate, shifting);
@@ -85,11 +112,13 @@ fn frame_motion(graph: &mut Graph, link: &Link, predecessor: Option<&FrameMotion
             carry(graph, rotation, shift, motion)
         }
     };
+    let (relative_angular, relative_linear) = rate_in_bias(graph, link);
     let (angular_bias, bias) = match link.axis {
-        Axis::Turn(_) => {
-            (vector::cross(graph, carried_angular, joint_angular), vector::cross(graph, carried_linear, joint_angular))
-        }
-        Axis::Shift(_) => (zero, vector::cross(graph, carried_angular, joint_linear)),
+        Axis::Turn(_) => (
+            vector::cross(graph, carried_angular, relative_angular),
+            vector::cross(graph, carried_linear, relative_angular),
+        ),
+        Axis::Shift(_) => (zero, vector::cross(graph, carried_angular, relative_linear)),
     };
     let angular_velocity = vector::add(graph, carried_angular, joint_angular);
     let velocity = vector::add(graph, carried_linear, joint_linear);
@@ -118,6 +147,35 @@ pub(super) fn carry(graph: &mut Graph, rotation: Matrix, shift: Vector, motion: 
     let lever = vector::cross(graph, motion.angular, shift);
     let linear = vector::add(graph, motion.linear, lever);
     (vector::apply_transposed(graph, rotation, motion.angular), vector::apply_transposed(graph, rotation, linear))
+}
+
+/// Angular velocity of a point's frame, ground axes.
+pub(super) fn angular_velocity(graph: &mut Graph, frames: &[FrameMotion], link: Option<usize>) -> Vector {
+    match link {
+        None => vector::zero(graph),
+        Some(link) => vector::apply(graph, frames[link].orientation, frames[link].angular_velocity),
+    }
+}
+
+/// Angular acceleration of a frame, ground axes.
+pub(super) fn angular_acceleration(
+    graph: &mut Graph,
+    frames: &[FrameMotion],
+    accelerations: &[SpatialMotion],
+    link: Option<usize>,
+) -> Vector {
+    match link {
+        None => vector::zero(graph),
+        Some(link) => vector::apply(graph, frames[link].orientation, accelerations[link].angular),
+    }
+}
+
+/// Link axes to ground axes.
+pub(super) fn orientation(graph: &mut Graph, frames: &[FrameMotion], link: Option<usize>) -> Matrix {
+    match link {
+        None => vector::identity(graph),
+        Some(link) => frames[link].orientation,
+    }
 }
 
 /// Spatial accelerations of the links relative to the ground, from the joints' accelerations.

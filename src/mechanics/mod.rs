@@ -8,15 +8,16 @@
 //! (`articulated`), all on symbolic scalars, so that whatever is structurally zero vanishes.
 
 mod articulated;
+mod assembly;
 mod derive;
 mod emit;
 mod forces;
 mod kinematics;
+mod loops;
 mod scale;
 mod starts;
 mod system;
 mod topology;
-mod vector;
 
 pub use derive::derive;
 pub use emit::{emit_equations, emit_model, emit_tree};

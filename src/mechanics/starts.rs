@@ -24,7 +24,7 @@ pub(super) fn starts(
             stated.or(match (base, state.kind) {
                 (StartBase::Equilibrium, _) => None,
                 (StartBase::Rest, VariableKind::Law) => Some(initial.get(&state.symbol).copied().unwrap_or(zero)),
-                (StartBase::Rest, _) => Some(zero),
+                (StartBase::Rest, _) => Some(graph.constant(state.reference)),
             })
         })
         .collect();

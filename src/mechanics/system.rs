@@ -1,5 +1,6 @@
 //! The equations of a study.
 
+use crate::diagnostics::Diagnostic;
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::Dimension;
 use std::collections::HashMap;
@@ -7,15 +8,26 @@ use std::collections::HashMap;
 /// `x' = rates(t, x, w, theta)`, `0 = constraints(t, x, w, theta)`, `y = outputs(t, x, w, theta)`.
 ///
 /// Plain trees have no algebraic variables w: the accelerations are eliminated symbolically (articulated-body
-/// algorithm), so the system is an explicit ordinary differential equation.
+/// algorithm), so the system is an explicit ordinary differential equation. Closed loops add multipliers in the
+/// Gear-Gupta-Leimkuhler form (Gear-Gupta-Leimkuhler-1985): `q' = T(q) (v + G^T mu)`, `v' = a(q, v, lambda)`,
+/// `0 = G v + g_t`, `0 = g`.
 #[derive(Clone, Debug)]
 pub struct System {
     pub graph: Graph,
     pub time: Symbol,
     pub states: Vec<Variable>,
     pub rates: Vec<Node>,
+    /// Multipliers of closed loops on velocity level, those on position level (Gear-Gupta-Leimkuhler), then reactions that
+    /// loads depend on.
     pub algebraic: Vec<Variable>,
+    /// One per algebraic variable: velocity constraints, position constraints, definitions of the reactions.
     pub constraints: Vec<Node>,
+    /// Time derivatives of the velocity constraints: they determine the first algebraic variables, one each.
+    pub hidden: Vec<Node>,
+    /// True per algebraic variable that is a multiplier: its constraint does not contain it.
+    pub index_two: Vec<bool>,
+    /// What was found on the way and changes nothing: redundant constraints.
+    pub warnings: Vec<Diagnostic>,
     pub parameters: Vec<Symbol>,
     pub parameter_names: Vec<String>,
     /// One per output of the study ([`crate::study::Study::outputs`]), in its order: measures, then criteria.
@@ -36,6 +48,8 @@ pub struct Variable {
     pub dimension: Dimension,
     /// Typical magnitude, SI; the integrator's absolute tolerance refers to it.
     pub scale: f64,
+    /// Value in the reference configuration: zero, but for the first component of quaternions.
+    pub reference: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +85,7 @@ impl System {
             let new = self.graph.substitute(&old, &replacements);
             nodes.into_iter().zip(new).for_each(|(node, new)| *node = new);
         };
-        substitute(self.rates.iter_mut().chain(&mut self.constraints).collect());
+        substitute(self.rates.iter_mut().chain(&mut self.constraints).chain(&mut self.hidden).collect());
         substitute(self.outputs.iter_mut().chain(&mut self.probes).map(|output| &mut output.value).collect());
         substitute(
             self.starts

@@ -1,19 +1,20 @@
 //! The spanning tree: which joint carries which body.
 
-use super::vector::{self, Vector};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::expression::Graph;
-use crate::study::{Attachment, Joint, JointKind, JointSymbols, Study};
+use crate::expression::vector::{self, Matrix, Vector};
+use crate::expression::{Graph, Node, Symbol};
+use crate::study::{Attachment, AxisMotion, Joint, JointSymbols, RotationSymbols, Study};
 use std::collections::VecDeque;
 
-/// One degree of freedom: a frame that shifts along or turns about a constant axis relative to its predecessor. A joint
-/// with several axes becomes a chain of links, all but the last without bodies.
+/// One single motion: a frame that shifts along or turns about a constant axis relative to its predecessor. A joint with
+/// several freedoms becomes a chain of links, all but the last without bodies. All links are parallel to the ground in the
+/// reference configuration.
 #[derive(Clone, Debug)]
 pub(super) struct Link {
     /// `None`: ground.
     pub predecessor: Option<usize>,
     pub joint: usize,
-    pub symbols: JointSymbols,
+    pub coordinate: Coordinate,
     pub axis: Axis,
     /// This link's origin at coordinate zero, in predecessor axes from the predecessor's origin.
     pub offset: Vector,
@@ -24,15 +25,52 @@ pub(super) struct Link {
 /// Motion per unit of the coordinate's rate, in the axes of the link (and of its predecessor: it is invariant).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Axis {
-    Turn([f64; 3]),
-    Shift([f64; 3]),
+    Turn(Vector),
+    Shift(Vector),
 }
 
-/// Where a body sits: frame (`None`: ground) and the body's origin in the frame's axes.
+/// What determines the motion along the axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Coordinate {
+    /// A state, index of the axis within the joint.
+    Free { symbols: JointSymbols, at: usize },
+    /// Position, velocity, acceleration are given.
+    Prescribed { symbols: JointSymbols, at: usize, motion: [Node; 3] },
+    /// One of the three components of a free rotation. The first carries the whole rotation of the frame.
+    Rotation { symbols: RotationSymbols, component: usize },
+    /// No motion; only there because what it transmits is asked for.
+    Weld,
+}
+
+impl Link {
+    /// Symbols of velocity and acceleration, where the motion is free.
+    pub fn free_symbols(&self) -> Option<(Symbol, Symbol)> {
+        match self.coordinate {
+            Coordinate::Free { symbols, .. } => Some((symbols.velocity, symbols.acceleration)),
+            Coordinate::Rotation { symbols, component } => {
+                Some((symbols.velocity[component], symbols.acceleration[component]))
+            }
+            Coordinate::Prescribed { .. } | Coordinate::Weld => None,
+        }
+    }
+
+    /// Rate of the coordinate (component of the relative velocity).
+    pub fn rate(&self, graph: &mut Graph) -> Node {
+        match self.coordinate {
+            Coordinate::Free { symbols, .. } => graph.variable(symbols.velocity),
+            Coordinate::Rotation { symbols, component } => graph.variable(symbols.velocity[component]),
+            Coordinate::Prescribed { motion, .. } => motion[1],
+            Coordinate::Weld => graph.constant(0.0),
+        }
+    }
+}
+
+/// Where a body sits: frame (`None`: ground), the body's origin in the frame's axes, body axes to frame axes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seat {
     pub link: Option<usize>,
     pub offset: Vector,
+    pub rotation: Matrix,
 }
 
 /// Links in an order in which predecessors come first.
@@ -41,8 +79,8 @@ pub(super) struct Tree {
     pub links: Vec<Link>,
     /// Per body of the study.
     pub seats: Vec<Seat>,
-    /// Per joint of the study; `None` for fixed joints.
-    pub link_of_joint: Vec<Option<usize>>,
+    /// Per joint of the study; empty for fixed joints and those that close loops.
+    pub links_of_joint: Vec<Vec<usize>>,
     /// Joints in the order of the walk, with the body each carries.
     pub walk: Vec<(usize, usize)>,
 }
@@ -50,37 +88,49 @@ pub(super) struct Tree {
 impl Tree {
     /// The frame and the position in it of a point of the study.
     pub fn place(&self, graph: &mut Graph, point: &Attachment) -> Seat {
-        match point.body {
-            None => Seat { link: None, offset: point.position },
-            Some(body) => {
-                let seat = self.seats[body];
-                Seat { link: seat.link, offset: vector::add(graph, seat.offset, point.position) }
-            }
+        let seat = self.seat(graph, point.body);
+        let turned = vector::apply(graph, seat.rotation, point.position);
+        Seat { offset: vector::add(graph, seat.offset, turned), ..seat }
+    }
+
+    pub fn seat(&self, graph: &mut Graph, body: Option<usize>) -> Seat {
+        match body {
+            Some(body) => self.seats[body],
+            None => ground_seat(graph),
         }
+    }
+
+    /// The link that moves along axis `at` of a joint.
+    pub fn link_of_axis(&self, joint: usize, at: usize) -> Option<usize> {
+        self.links_of_joint[joint].iter().copied().find(|&link| match self.links[link].coordinate {
+            Coordinate::Free { at: own, .. } | Coordinate::Prescribed { at: own, .. } => own == at,
+            _ => false,
+        })
+    }
+
+    /// Whether the walk went from the joint's child to its parent.
+    pub fn is_reversed(&self, study: &Study, joint: usize) -> bool {
+        self.walk.iter().any(|&(number, body)| number == joint && study.joints[joint].parent.body == Some(body))
     }
 }
 
-/// Walks from ground over the joints, breadth first in order of declaration.
+fn ground_seat(graph: &mut Graph) -> Seat {
+    Seat { link: None, offset: vector::zero(graph), rotation: vector::identity(graph) }
+}
+
+/// Walks from ground over the joints that carry bodies, breadth first in order of declaration.
 pub(super) fn spanning_tree(study: &Study, graph: &mut Graph) -> Result<Tree, Vec<Diagnostic>> {
     let ground = study.bodies.len();
     let index = |attachment: &Attachment| attachment.body.unwrap_or(ground);
     let mut joints_at = vec![Vec::new(); ground + 1];
-    let mut errors = Vec::new();
-    // The joint declared last in a loop is the one that closes it.
-    let mut group: Vec<usize> = (0..=ground).collect();
-    for (number, joint) in study.joints.iter().enumerate() {
-        let (kept, merged) = (group[index(&joint.parent)], group[index(&joint.child)]);
-        if kept == merged {
-            errors.push(closed_loop(joint));
-            continue;
-        }
-        group.iter_mut().filter(|member| **member == merged).for_each(|member| *member = kept);
+    for (number, joint) in study.joints.iter().enumerate().filter(|(_, joint)| !joint.closes_loop) {
         joints_at[index(&joint.parent)].push(number);
         joints_at[index(&joint.child)].push(number);
     }
     let mut seats: Vec<Option<Seat>> = vec![None; ground + 1];
-    seats[ground] = Some(Seat { link: None, offset: vector::zero(graph) });
-    let mut tree = Tree { links: vec![], seats: vec![], link_of_joint: vec![None; study.joints.len()], walk: vec![] };
+    seats[ground] = Some(ground_seat(graph));
+    let mut tree =
+        Tree { links: vec![], seats: vec![], links_of_joint: vec![vec![]; study.joints.len()], walk: vec![] };
     let mut queue = VecDeque::from([ground]);
     while let Some(from) = queue.pop_front() {
         for &number in &joints_at[from] {
@@ -88,10 +138,12 @@ pub(super) fn spanning_tree(study: &Study, graph: &mut Graph) -> Result<Tree, Ve
             let is_reversed = index(&joint.parent) != from;
             let to = if is_reversed { index(&joint.parent) } else { index(&joint.child) };
             let (Some(seat), None) = (seats[from], seats[to]) else { continue };
-            seats[to] = Some(tree.attach(graph, (number, joint), is_reversed, seat, to));
+            let is_asked = study.reactions.iter().any(|reaction| reaction.joint == number);
+            seats[to] = Some(tree.attach(graph, study, (number, joint), (is_reversed, is_asked), seat, to));
             queue.push_back(to);
         }
     }
+    let mut errors = Vec::new();
     for (body, seat) in study.bodies.iter().zip(&seats) {
         match seat {
             Some(seat) => tree.seats.push(*seat),
@@ -105,45 +157,97 @@ pub(super) fn spanning_tree(study: &Study, graph: &mut Graph) -> Result<Tree, Ve
     if errors.is_empty() { Ok(tree) } else { Err(errors) }
 }
 
-fn closed_loop(joint: &Joint) -> Diagnostic {
-    Diagnostic::error(Code::CLOSED_LOOP, format!("joint `{}` closes a kinematic loop", joint.name))
-        .label(joint.span, "both bodies are already connected by other joints")
-        .help("only trees of joints are supported: remove this joint or replace it by a stiff force element")
-}
-
 impl Tree {
     /// Adds what `joint` carries; returns where body `to` sits.
     fn attach(
         &mut self,
         graph: &mut Graph,
+        study: &Study,
         (number, joint): (usize, &Joint),
-        is_reversed: bool,
+        (is_reversed, is_asked): (bool, bool),
         seat: Seat,
         to: usize,
     ) -> Seat {
         let (near, far) = if is_reversed { (&joint.child, &joint.parent) } else { (&joint.parent, &joint.child) };
         self.walk.push((number, to));
+        let (parent_rotation, rotation) = rotations(graph, joint, is_reversed, seat.rotation);
         let mut frame = seat.link;
-        let mut offset = vector::add(graph, seat.offset, near.position);
-        for (axis, symbols) in axes(joint.kind, is_reversed).into_iter().zip(joint.coordinate) {
-            self.links.push(Link { predecessor: frame, joint: number, symbols, axis, offset, bodies: vec![] });
+        let turned = vector::apply(graph, seat.rotation, near.position);
+        let mut offset = vector::add(graph, seat.offset, turned);
+        let mut motions = motions(graph, study, joint, is_reversed, parent_rotation);
+        if motions.is_empty() && is_asked {
+            motions.push((Axis::Turn(vector::zero(graph)), Coordinate::Weld));
+        }
+        for (axis, coordinate) in motions {
+            self.links.push(Link { predecessor: frame, joint: number, coordinate, axis, offset, bodies: vec![] });
             frame = Some(self.links.len() - 1);
-            self.link_of_joint[number] = frame;
+            self.links_of_joint[number].push(self.links.len() - 1);
             offset = vector::zero(graph);
         }
         if let Some(link) = frame {
             self.links[link].bodies.push(to);
         }
-        Seat { link: frame, offset: vector::subtract(graph, offset, far.position) }
+        let arm = vector::apply(graph, rotation, far.position);
+        Seat { link: frame, offset: vector::subtract(graph, offset, arm), rotation }
     }
 }
 
-/// The axes a joint moves along, one after the other. Walked from child to parent the motion is the opposite one.
-fn axes(kind: JointKind, is_reversed: bool) -> Vec<Axis> {
-    let sign = if is_reversed { -1.0 } else { 1.0 };
-    match kind {
-        JointKind::Fixed => vec![],
-        JointKind::Prismatic { axis } => vec![Axis::Shift(axis.map(|x| sign * x))],
-        JointKind::Revolute { axis } => vec![Axis::Turn(axis.map(|x| sign * x))],
+/// Seat rotations of the parent and of the outer body, from that of the inner body.
+fn rotations(graph: &mut Graph, joint: &Joint, is_reversed: bool, inner: Matrix) -> (Matrix, Matrix) {
+    let outer = match joint.orientation {
+        None => inner,
+        Some(matrix) => {
+            let matrix = if is_reversed { vector::transpose(matrix) } else { matrix };
+            vector::multiply(graph, inner, matrix)
+        }
+    };
+    if is_reversed { (outer, outer) } else { (inner, outer) }
+}
+
+/// The motions of a joint, one after the other. Walked from child to parent they are the opposite ones in opposite order.
+fn motions(
+    graph: &mut Graph,
+    study: &Study,
+    joint: &Joint,
+    is_reversed: bool,
+    parent_rotation: Matrix,
+) -> Vec<(Axis, Coordinate)> {
+    let mut result = Vec::new();
+    for (at, axis) in joint.axes.iter().enumerate() {
+        let direction = vector::constant(graph, axis.motion.direction());
+        let mut direction = vector::apply(graph, parent_rotation, direction);
+        if is_reversed {
+            direction = vector::negate(graph, direction);
+        }
+        let link_axis = match axis.motion {
+            AxisMotion::Shift(_) => Axis::Shift(direction),
+            AxisMotion::Turn(_) => Axis::Turn(direction),
+        };
+        let symbols = axis.symbols;
+        let coordinate = match axis.prescribed {
+            None => Coordinate::Free { symbols, at },
+            Some(position) => {
+                let velocity = graph.differentiate(&[position], study.time)[0];
+                let acceleration = graph.differentiate(&[velocity], study.time)[0];
+                Coordinate::Prescribed { symbols, at, motion: [position, velocity, acceleration] }
+            }
+        };
+        result.push((link_axis, coordinate));
     }
+    if is_reversed {
+        result.reverse();
+    }
+    if let Some(symbols) = joint.rotation {
+        let components = (0..3).map(|component| {
+            let axis = std::array::from_fn(|i| graph.constant(if i == component { 1.0 } else { 0.0 }));
+            (Axis::Turn(axis), Coordinate::Rotation { symbols, component })
+        });
+        let components: Vec<_> = components.collect();
+        if is_reversed {
+            result.splice(0..0, components);
+        } else {
+            result.extend(components);
+        }
+    }
+    result
 }

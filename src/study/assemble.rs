@@ -5,7 +5,7 @@ use super::checker::{Allowed, Checker, Scope, Site};
 use super::declarations::Declarations;
 use super::model::{Force, ForcePlace, Signal, State, Study};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::expression::{Graph, Node, Operation};
+use crate::expression::{Graph, Node, Operation, Symbol};
 use crate::syntax::ElementRole;
 
 const SCOPE: Scope = Scope::Study(Allowed::Number);
@@ -39,11 +39,17 @@ impl<'a> Checker<'a> {
         let places = self.finished_places(&forces, &measures);
         let effects = self.effect_catalogue();
         self.check_declarations();
-        let roots = self.roots(&gravity, &forces, &measures, &experiments);
+        let roots = self.roots(&gravity, &joints, &forces, &measures, &experiments);
         let kept = self.check_influence(&roots);
         self.check_unused(&roots);
         let (name, title) = self.name_of_study()?;
         self.constants.sort_by_key(|constant| (constant.span.file, constant.span.start));
+        let reactions = std::mem::take(&mut self.reactions)
+            .into_iter()
+            .filter_map(|reaction| {
+                Some(super::model::ReactionQuantity { joint: self.joint_position(reaction.joint)?, ..reaction })
+            })
+            .collect();
         let parameters = kept.into_iter().map(|index| self.parameters[index].clone()).collect();
         Some(Study {
             name,
@@ -62,6 +68,7 @@ impl<'a> Checker<'a> {
             states: std::mem::take(&mut self.states),
             measures,
             point_quantities: std::mem::take(&mut self.point_quantities),
+            reactions,
             groups,
             experiments,
             manoeuvres,
@@ -114,12 +121,12 @@ impl<'a> Checker<'a> {
                 continue;
             }
             let load = self.site_value(Site::JointEffect(index), element.name.span);
-            if let (Some(load), Some((joint, coordinate, rate))) = (load, self.joint_of_effect(index)) {
+            if let (Some(load), Some((place, coordinate, rate))) = (load, self.joint_of_effect(index)) {
                 forces.push(Force {
                     name: element.name.text.clone(),
                     law: element.law.text.clone(),
                     is_actuator: false,
-                    place: ForcePlace::Joint(joint),
+                    place,
                     load: load.node,
                     coordinate,
                     rate,
@@ -132,16 +139,19 @@ impl<'a> Checker<'a> {
 
     fn finished_place(&self, place: ForcePlace) -> Option<ForcePlace> {
         match place {
-            ForcePlace::Joint(joint) => self.joint_position(joint).map(ForcePlace::Joint),
+            ForcePlace::Joint { joint, axis } => {
+                self.joint_position(joint).map(|joint| ForcePlace::Joint { joint, axis })
+            }
             between => Some(between),
         }
     }
 
-    fn joint_of_effect(&self, effect: usize) -> Option<(usize, crate::expression::Symbol, crate::expression::Symbol)> {
+    fn joint_of_effect(&self, effect: usize) -> Option<(ForcePlace, Symbol, Symbol)> {
         let crate::syntax::ElementPlace::On(name) = self.declared.effects[effect].place else { return None };
-        let joint = self.declared.joints.iter().position(|joint| joint.name.text == name.text)?;
-        let (symbols, _) = self.joint_symbols.get(joint).copied().flatten()?;
-        Some((self.joint_position(joint)?, symbols.position, symbols.velocity))
+        let &(joint, axis) = self.axis_index.get(&name.text)?;
+        let symbols = self.axis_entry(joint, axis)?.symbols;
+        let place = ForcePlace::Joint { joint: self.joint_position(joint)?, axis };
+        Some((place, symbols.position, symbols.velocity))
     }
 
     fn finished_signals(&mut self) -> Vec<Signal> {
@@ -212,6 +222,7 @@ impl<'a> Checker<'a> {
     fn roots(
         &self,
         gravity: &[Node; 3],
+        joints: &[super::model::Joint],
         forces: &[Force],
         measures: &[super::model::Measure],
         experiments: &[super::model::Experiment],
@@ -231,6 +242,15 @@ impl<'a> Checker<'a> {
                 roots.extend(free_length);
                 roots.extend(first.position.into_iter().chain(second.position));
             }
+        }
+        for joint in joints {
+            let ends = [&joint.parent, &joint.child];
+            if joint.closes_loop || joint.orientation.is_some() || joint.rotation.is_some() {
+                roots.extend(ends.into_iter().flat_map(|end| end.position));
+            }
+            roots.extend(joint.orientation.iter().flatten().flatten());
+            roots.extend(joint.length);
+            roots.extend(joint.axes.iter().filter_map(|axis| axis.prescribed));
         }
         roots.extend(self.states.iter().flat_map(|state| [state.derivative, state.initial]));
         roots.extend(measures.iter().map(|measure| measure.value));

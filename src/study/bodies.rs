@@ -5,10 +5,10 @@ use super::declarations::Declarations;
 use super::evaluate::{Typed, literal};
 use super::fields::{find, value_span};
 use super::identify::written_unit;
-use super::model::{Attachment, Body, Joint, JointKind, Point};
+use super::model::{Attachment, AxisMotion, Body, Point};
 use super::topology::End;
 use crate::diagnostics::{Code, Diagnostic, Span};
-use crate::expression::Node;
+use crate::expression::{Node, vector};
 use crate::quantities::Dimension;
 use crate::syntax::{Expression, Field, Value};
 
@@ -147,7 +147,7 @@ impl<'a> Checker<'a> {
     }
 
     /// Components in brackets; a bare number takes the unit of the next one that has a unit, else of the one before.
-    fn tuple(
+    pub fn tuple(
         &mut self,
         path: &str,
         components: &'a [Expression],
@@ -196,17 +196,19 @@ impl<'a> Checker<'a> {
     /// What a joint moves must have inertia against that motion.
     fn check_moving_masses(&mut self) {
         for joint in 0..self.topology.joints.len() {
-            let Some((kind, _, child)) = self.topology.joints[joint] else { continue };
+            let Some(read) = self.topology.joint(joint) else { continue };
+            let (child, freedom) = (read.child, &read.freedom);
             let moved: Vec<usize> = (0..self.bodies.len())
                 .filter(|body| Some(*body) == child.body || self.topology.chain(Some(*body)).contains(&joint))
                 .collect();
             let is_weightless = |body: &usize| self.graph.is_zero(self.bodies[*body].mass);
             let has_no_inertia = |body: &usize| self.bodies[*body].inertia.iter().all(|part| self.graph.is_zero(*part));
-            let without = match kind {
-                JointKind::Fixed => false,
-                JointKind::Prismatic { .. } => moved.iter().all(is_weightless),
-                JointKind::Revolute { .. } => moved.iter().all(|body| is_weightless(body) && has_no_inertia(body)),
-            };
+            let moves_freely = |at: usize| !self.topology.closes_loop[joint] && !self.is_prescribed(joint, at);
+            let mut free = freedom.axes.iter().enumerate().filter(|(at, _)| moves_freely(*at)).map(|(_, axis)| axis);
+            let shifts = free.clone().any(|axis| matches!(axis.motion, AxisMotion::Shift(_)));
+            let turns = freedom.rotation.is_some() || free.any(|axis| matches!(axis.motion, AxisMotion::Turn(_)));
+            let without = (shifts && moved.iter().all(is_weightless))
+                || (turns && moved.iter().all(|body| is_weightless(body) && has_no_inertia(body)));
             let body = child.body.map(|index| &self.declared.bodies[index]);
             if let Some(body) = body.filter(|body| without && find(body.fields, "mass").is_some()) {
                 let name = &self.declared.joints[joint].name;
@@ -246,30 +248,26 @@ impl<'a> Checker<'a> {
         Attachment { body: end.body, position: position.unwrap_or([zero; 3]) }
     }
 
-    /// Position of an attachment in ground axes in the reference configuration, where all axes are parallel.
+    /// Position of an attachment in ground axes in the reference configuration.
     pub fn reference_position(&mut self, attachment: Attachment) -> [Node; 3] {
         let mut position = attachment.position;
+        let mut body = attachment.body;
         for joint in self.topology.chain(attachment.body) {
-            let Some((_, parent, child)) = self.topology.joints[joint] else { continue };
-            let (parent, child) = (self.attachment(parent), self.attachment(child));
-            for ((coordinate, of_child), of_parent) in position.iter_mut().zip(child.position).zip(parent.position) {
-                let from_child = self.graph.subtract(*coordinate, of_child);
-                *coordinate = self.graph.add(from_child, of_parent);
-            }
+            let Some(read) = self.topology.joint(joint) else { continue };
+            let (far, near) = read.seen_from(body);
+            let is_parent = read.parent.body == body;
+            body = near.body;
+            let (near, far) = (self.attachment(near), self.attachment(far));
+            let orientation = self.joint_orientation(joint);
+            let graph = &mut self.graph;
+            let from_joint = vector::subtract(graph, position, far.position);
+            let turned = match orientation {
+                None => from_joint,
+                Some(matrix) if is_parent => vector::apply_transposed(graph, matrix, from_joint),
+                Some(matrix) => vector::apply(graph, matrix, from_joint),
+            };
+            position = vector::add(graph, turned, near.position);
         }
         position
-    }
-
-    /// The joints, parents before children.
-    pub fn finished_joints(&mut self) -> Vec<Joint> {
-        let mut joints = Vec::new();
-        for index in self.topology.order.clone() {
-            let Some((kind, parent, child)) = self.topology.joints[index] else { continue };
-            let (parent, child) = (self.attachment(parent), self.attachment(child));
-            let name = &self.declared.joints[index].name;
-            let coordinate = self.joint_symbols[index].map(|(symbols, _)| symbols);
-            joints.push(Joint { name: name.text.clone(), kind, parent, child, coordinate, span: name.span });
-        }
-        joints
     }
 }

@@ -5,11 +5,11 @@ use super::elements::PlacedForce;
 use super::evaluate::Typed;
 use super::instance::Instance;
 use super::load::Loaded;
-use super::model::{Body, Constant, Input, JointSymbols, Motion, Parameter, Point, PointQuantity, State};
+use super::model::{Body, Constant, Input, Parameter, Point, PointQuantity, ReactionQuantity, State};
 use super::tables::Table;
 use super::topology::Topology;
 use crate::diagnostics::{Code, Diagnostic, Span};
-use crate::expression::{Graph, Symbol};
+use crate::expression::{Graph, Node, Symbol};
 use crate::syntax::Name;
 use std::collections::{HashMap, HashSet};
 
@@ -41,6 +41,8 @@ pub(super) enum Entity {
     Input(usize),
     Body(usize),
     Joint(usize),
+    /// Joint and axis: a place for elements.
+    JointAxis(usize, usize),
     Force(usize),
     Signal(usize),
     Effect(usize),
@@ -110,8 +112,11 @@ pub(super) struct Checker<'a> {
     pub bodies: Vec<Body>,
     /// Points of ground.
     pub ground_points: Vec<Point>,
-    /// Per declared joint; `None` for fixed joints.
-    pub joint_symbols: Vec<Option<(JointSymbols, Motion)>>,
+    /// Joint and axis by the axis' name.
+    pub axis_index: HashMap<String, (usize, usize)>,
+    /// Orientations of joints found so far.
+    pub orientations: HashMap<usize, Option<[[Node; 3]; 3]>>,
+    pub reactions: Vec<ReactionQuantity>,
     pub instances: Vec<Instance<'a>>,
     pub placed_forces: Vec<Option<PlacedForce>>,
     pub force_instances: Vec<Option<usize>>,
@@ -150,7 +155,9 @@ impl<'a> Checker<'a> {
             topology: Topology::default(),
             bodies: Vec::new(),
             ground_points: Vec::new(),
-            joint_symbols: Vec::new(),
+            axis_index: HashMap::new(),
+            orientations: HashMap::new(),
+            reactions: Vec::new(),
             instances: Vec::new(),
             placed_forces: Vec::new(),
             force_instances: Vec::new(),

@@ -66,7 +66,7 @@ pub(super) struct Body<'a> {
 pub(super) struct Joint<'a> {
     pub name: &'a Name,
     pub kind: &'a Name,
-    pub axis: Option<&'a crate::syntax::Direction>,
+    pub axes: &'a [crate::syntax::JointAxis],
     pub parent: &'a Name,
     pub child: &'a Name,
     pub fields: &'a [Field],
@@ -236,8 +236,8 @@ fn sort<'a>(result: &mut Declarations<'a>, item: &'a Item, by_variant: bool, dia
             once(&mut result.ground, Body { name, fields, points }, "body ground", name.span, diagnostics);
         }
         ItemKind::Body { name, fields, points } => result.bodies.push(Body { name, fields, points }),
-        ItemKind::Joint { name, kind, axis, parent, child, fields } => {
-            result.joints.push(Joint { name, kind, axis: axis.as_ref(), parent, child, fields });
+        ItemKind::Joint { name, kind, axes, parent, child, fields } => {
+            result.joints.push(Joint { name, kind, axes, parent, child, fields });
         }
         ItemKind::Element { role, name, law, place, fields } => {
             let element = Element { role: *role, name, law, place, fields };

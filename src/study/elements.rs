@@ -5,12 +5,15 @@ use super::declarations::{Declarations, Element, SignalKind};
 use super::evaluate::Typed;
 use super::fields::find;
 use super::instance::{Instance, Progress};
+use super::joints::AxisEntry;
 use super::kinds::{Kinds, coordinate_dimension, load_dimension, rate_dimension};
-use super::model::{ForcePlace, Motion, PlaceKind};
+use super::model::{ForceDirection, ForcePlace, Motion, PlaceKind};
 use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use crate::expression::{Node, Symbol, Unary};
 use crate::quantities::{Dimension, Unit, named_type};
-use crate::syntax::{Declared, EffectAction, ElementPlace, Field, LawDeclaration, Name};
+use crate::syntax::{
+    Declared, Direction, DirectionKind, EffectAction, ElementPlace, Field, LawDeclaration, Name, PlaceAxis,
+};
 
 const SCOPE: Scope = Scope::Study(Allowed::Constant);
 
@@ -65,7 +68,7 @@ impl<'a> Checker<'a> {
     fn force_place(&mut self, element: &Element<'a>) -> Option<PlacedForce> {
         match element.place {
             ElementPlace::On(name) => self.place_on_joint(element, name),
-            ElementPlace::Between { first, second, along } => {
+            ElementPlace::Between { first, second, axis } => {
                 let (a, b) = (self.end(first), self.end(second));
                 let (a, b) = (a?, b?);
                 if a.body == b.body {
@@ -74,9 +77,13 @@ impl<'a> Checker<'a> {
                         .label(first.span.to(second.span), "the same body twice");
                     return self.fail(diagnostic, SCOPE);
                 }
-                let along = match along {
-                    Some(direction) => Some(self.direction(direction)?),
-                    None => self.topology.common_axis(a.body, b.body),
+                let along = match axis {
+                    Some((how, direction)) => Some(self.force_direction(*how, direction)?),
+                    None => self.topology.common_axis(a.body, b.body).map(|axis| ForceDirection {
+                        axis,
+                        body: None,
+                        motion: Motion::Translational,
+                    }),
                 };
                 let free_length = find(element.fields, "free_length");
                 let (first, second) = (self.attachment(a), self.attachment(b));
@@ -93,8 +100,9 @@ impl<'a> Checker<'a> {
                 };
                 let coordinate = self.graph.symbol(&format!("{}.elongation", element.name.text));
                 let rate = self.graph.symbol(&format!("{}.rate", element.name.text));
+                let motion = along.map_or(Motion::Translational, |along| along.motion);
                 let place = ForcePlace::Between { first, second, along, free_length };
-                Some(PlacedForce { place, motion: Motion::Translational, coordinate, rate })
+                Some(PlacedForce { place, motion, coordinate, rate })
             }
             ElementPlace::Nowhere => {
                 let message = format!("`{}` has no place", element.name.text);
@@ -107,28 +115,83 @@ impl<'a> Checker<'a> {
     }
 
     fn place_on_joint(&mut self, element: &Element<'a>, name: &'a Name) -> Option<PlacedForce> {
-        let entity = self.entities.get(name.text.as_str()).copied();
-        let Some(Entity::Joint(joint)) = entity else { return self.no_joint(name, entity) };
-        let Some((symbols, motion)) = self.joint_symbols.get(joint).copied().flatten() else {
-            if matches!(self.topology.kind(joint), Some(super::model::JointKind::Fixed)) {
-                let message = format!("`{}` stands on a joint that does not move", element.name.text);
-                let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message).label(name.span, "a fixed joint");
-                return self.fail(diagnostic, SCOPE);
-            }
-            return None;
+        let (joint, axis) = match self.place_entity(&name.text) {
+            Some(Entity::JointAxis(joint, axis)) => (joint, axis),
+            Some(Entity::Joint(joint)) => return self.no_single_axis(element, name, joint),
+            entity => return self.no_joint(name, entity),
         };
+        let entry = self.axis_entry(joint, axis)?;
+        let (symbols, motion) = (entry.symbols, entry.motion.motion());
         if let Some(field) = find(element.fields, "free_length") {
             let diagnostic = Diagnostic::error(Code::UNKNOWN_FIELD, "elements on a joint have no free length")
                 .label(field.key.span, "the joint's coordinate counts from the reference configuration");
             self.report(diagnostic, SCOPE);
         }
         let (coordinate, rate) = (symbols.position, symbols.velocity);
-        Some(PlacedForce { place: ForcePlace::Joint(joint), motion, coordinate, rate })
+        Some(PlacedForce { place: ForcePlace::Joint { joint, axis }, motion, coordinate, rate })
+    }
+
+    /// `along z`, `along bogie.y`, `about z`.
+    fn force_direction(&mut self, how: PlaceAxis, direction: &'a Direction) -> Option<ForceDirection> {
+        let motion = match how {
+            PlaceAxis::Along => Motion::Translational,
+            PlaceAxis::About => Motion::Rotational,
+        };
+        let DirectionKind::OfBody { path, negative } = &direction.kind else {
+            return Some(ForceDirection { axis: self.direction(direction)?, body: None, motion });
+        };
+        let axis = path.text.rsplit_once('.').and_then(|(body, letter)| {
+            let index = ["x", "y", "z"].iter().position(|axis| *axis == letter)?;
+            let body = self.declared.bodies.iter().position(|declared| declared.name.text == body)?;
+            Some((body, index))
+        });
+        let Some((body, index)) = axis else {
+            let bodies = self.declared.bodies.iter().map(|body| body.name.text.as_str());
+            let first = path.text.split('.').next().unwrap_or_default();
+            let diagnostic = Diagnostic::error(Code::AXIS, format!("`{}` is no axis of a body", path.text))
+                .label(path.span, "not known")
+                .suggest(similar_name(first, bodies))
+                .help("write `x`, `y`, `z`, three numbers, or an axis that turns with a body: `along bogie.y`");
+            return self.fail(diagnostic, SCOPE);
+        };
+        let mut vector = [0.0; 3];
+        vector[index] = if *negative { -1.0 } else { 1.0 };
+        Some(ForceDirection { axis: vector, body: Some(body), motion })
+    }
+
+    /// What a name means as place of an element: the axis of a joint comes before the joint.
+    pub fn place_entity(&self, name: &str) -> Option<Entity> {
+        if let Some(&(joint, axis)) = self.axis_index.get(name) {
+            return Some(Entity::JointAxis(joint, axis));
+        }
+        self.entities.get(name).copied()
+    }
+
+    pub fn axis_entry(&self, joint: usize, axis: usize) -> Option<&AxisEntry> {
+        self.topology.joint(joint)?.freedom.axes.get(axis)
+    }
+
+    fn no_single_axis<T>(&mut self, element: &Element<'a>, name: &'a Name, joint: usize) -> Option<T> {
+        let freedom = &self.topology.joint(joint)?.freedom;
+        let axes: Vec<String> = freedom.axes.iter().map(|axis| format!("`{}`", axis.name)).collect();
+        let diagnostic = if axes.is_empty() {
+            let message = format!("`{}` stands on a joint that has no axis", element.name.text);
+            let what = if freedom.rotation.is_some() { "it turns freely" } else { "a fixed joint" };
+            Diagnostic::error(Code::WRONG_PLACE, message)
+                .label(name.span, what)
+                .help("between two bodies write `A -> B along z` or `A -> B about z`")
+        } else {
+            Diagnostic::error(Code::WRONG_PLACE, format!("joint `{}` has several axes", name.text))
+                .label(name.span, "which one?")
+                .help(format!("write one of {}", axes.join(", ")))
+        };
+        self.fail(diagnostic, SCOPE)
     }
 
     fn no_joint<T>(&mut self, name: &'a Name, entity: Option<Entity>) -> Option<T> {
-        let joints = self.declared.joints.iter().map(|joint| joint.name.text.as_str());
-        let similar = similar_name(&name.text, joints);
+        let mut axes: Vec<&str> = self.axis_index.keys().map(String::as_str).collect();
+        axes.sort_unstable();
+        let similar = similar_name(&name.text, axes);
         let (code, message) = match entity {
             Some(_) => (Code::WRONG_PLACE, format!("`{}` is not a joint", name.text)),
             None => (Code::UNKNOWN_NAME, format!("there is no joint `{}`", name.text)),
@@ -182,8 +245,8 @@ impl<'a> Checker<'a> {
             ("x", Typed::new(x, coordinate_dimension(placed.motion))),
             ("v", Typed::new(v, rate_dimension(placed.motion))),
         ];
-        if let ForcePlace::Joint(joint) = placed.place {
-            place_ports.push(("inertia", self.joint_inertia(joint, placed.motion)?));
+        if let ForcePlace::Joint { joint, axis } = placed.place {
+            place_ports.push(("inertia", self.joint_inertia(joint, axis)?));
         } else if let Some(port) = law.ports.iter().find(|port| port.name.text == "inertia") {
             let message = format!("law `{}` needs the inertia that a joint moves", law.name.text);
             let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
@@ -198,9 +261,10 @@ impl<'a> Checker<'a> {
         Some(self.add_instance(instance, element.fields, &["free_length"], element.law))
     }
 
-    fn joint_inertia(&mut self, joint: usize, motion: Motion) -> Option<Typed> {
-        let (symbols, _) = self.joint_symbols.get(joint).copied().flatten()?;
-        let node = self.graph.variable(symbols.inertia);
+    fn joint_inertia(&mut self, joint: usize, axis: usize) -> Option<Typed> {
+        let entry = self.axis_entry(joint, axis)?;
+        let (inertia, motion) = (entry.symbols.inertia, entry.motion.motion());
+        let node = self.graph.variable(inertia);
         let acceleration = rate_dimension(motion) / Dimension::TIME;
         Some(Typed::new(node, load_dimension(motion) / acceleration))
     }
@@ -249,7 +313,7 @@ impl<'a> Checker<'a> {
                 .help("write `on NAME` with the name of a joint, force, actuator, input, measure or signal");
             return self.fail(diagnostic, SCOPE);
         };
-        let Some(&entity) = self.entities.get(name.text.as_str()) else {
+        let Some(entity) = self.place_entity(&name.text) else {
             let names = self.all_names();
             let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no `{}`", name.text))
                 .label(name.span, "not declared")
@@ -257,9 +321,7 @@ impl<'a> Checker<'a> {
             return self.fail_unknown(&name.text, diagnostic, SCOPE);
         };
         let site = match entity {
-            Entity::Joint(joint) if self.joint_symbols.get(joint).copied().flatten().is_some() => {
-                Site::JointEffect(index)
-            }
+            Entity::JointAxis(..) => Site::JointEffect(index),
             Entity::Force(force) => Site::Force(force),
             Entity::Input(input) => Site::Input(input),
             Entity::Measure(measure) => Site::Measure(measure),
@@ -297,12 +359,13 @@ impl<'a> Checker<'a> {
         }
         self.check_effect_place(index, entity, motion)?;
         let mut place_ports: Vec<(&'a str, Typed)> = Vec::new();
-        if let (Site::JointEffect(_), Entity::Joint(joint)) = (site, entity) {
-            let (symbols, motion) = self.joint_symbols.get(joint).copied().flatten()?;
+        if let (Site::JointEffect(_), Entity::JointAxis(joint, axis)) = (site, entity) {
+            let entry = self.axis_entry(joint, axis)?;
+            let (symbols, motion) = (entry.symbols, entry.motion.motion());
             let (x, v) = (self.graph.variable(symbols.position), self.graph.variable(symbols.velocity));
             place_ports.push(("x", Typed::new(x, coordinate_dimension(motion))));
             place_ports.push(("v", Typed::new(v, rate_dimension(motion))));
-            place_ports.push(("inertia", self.joint_inertia(joint, motion)?));
+            place_ports.push(("inertia", self.joint_inertia(joint, axis)?));
         }
         let step = self.site_effects.get(&site).and_then(|chain| chain.iter().position(|other| *other == index));
         let instance = Instance {
@@ -410,7 +473,7 @@ impl<'a> Checker<'a> {
 
     pub fn place_kind(&self, entity: Entity) -> Option<PlaceKind> {
         Some(match entity {
-            Entity::Joint(_) => PlaceKind::Joint,
+            Entity::JointAxis(..) => PlaceKind::Joint,
             Entity::Force(index) => match self.declared.forces[index].role {
                 crate::syntax::ElementRole::Actuator => PlaceKind::Actuator,
                 _ => PlaceKind::Force,
@@ -418,7 +481,7 @@ impl<'a> Checker<'a> {
             Entity::Input(_) => PlaceKind::Input,
             Entity::Measure(_) => PlaceKind::Measure,
             Entity::Signal(_) => PlaceKind::Signal,
-            Entity::Constant(_) | Entity::Body(_) | Entity::Effect(_) => return None,
+            Entity::Joint(_) | Entity::Constant(_) | Entity::Body(_) | Entity::Effect(_) => return None,
         })
     }
 }

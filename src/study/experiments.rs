@@ -222,14 +222,23 @@ impl<'a> Checker<'a> {
     }
 
     fn start_target(&mut self, path: &str) -> Option<(Symbol, Dimension)> {
-        let (owner, Some(quantity)) = self.split_path(path) else { return None };
-        if let Some(Entity::Joint(joint)) = self.entities.get(owner) {
-            let (symbols, motion) = self.joint_symbols.get(*joint).copied().flatten()?;
+        let (owner, quantity) = path.rsplit_once('.')?;
+        if let Some(&(joint, axis)) = self.axis_index.get(owner) {
+            let entry = self.axis_entry(joint, axis)?;
+            let (symbols, motion) = (entry.symbols, entry.motion.motion());
             return match quantity {
                 "position" => Some((symbols.position, super::kinds::coordinate_dimension(motion))),
                 "velocity" => Some((symbols.velocity, super::kinds::rate_dimension(motion))),
                 _ => None,
             };
+        }
+        for rotation in self.topology.joints.iter().flatten().filter_map(|read| read.freedom.rotation.as_ref()) {
+            if let Some(symbol) = rotation.quaternion.iter().find(|symbol| self.graph.symbol_name(**symbol) == path) {
+                return Some((*symbol, Dimension::ONE));
+            }
+            if let Some(symbol) = rotation.velocity.iter().find(|symbol| self.graph.symbol_name(**symbol) == path) {
+                return Some((*symbol, Dimension::ONE / Dimension::TIME));
+            }
         }
         let state = self.states.iter().find(|state| state.name == path)?;
         Some((state.symbol, state.dimension))

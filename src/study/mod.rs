@@ -19,6 +19,7 @@ mod fields;
 mod functions;
 mod identify;
 mod instance;
+mod joints;
 mod kinds;
 mod load;
 mod manoeuvres;

@@ -31,6 +31,8 @@ pub struct Study {
     pub measures: Vec<Measure>,
     /// Symbols for coordinates of points that expressions mention.
     pub point_quantities: Vec<PointQuantity>,
+    /// Symbols for what joints transmit.
+    pub reactions: Vec<ReactionQuantity>,
     /// The tree of channel groups; the root is called `total`.
     pub groups: Group,
     pub experiments: Vec<Experiment>,
@@ -47,6 +49,16 @@ pub struct Study {
     pub effects: Vec<EffectDeclaration>,
     /// Everything an effect can attach to.
     pub places: Vec<Place>,
+}
+
+impl Study {
+    /// The axis that a force element stands on, if it stands on a joint.
+    pub fn axis_of(&self, force: &Force) -> Option<&JointAxis> {
+        match force.place {
+            ForcePlace::Joint { joint, axis } => self.joints.get(joint)?.axes.get(axis),
+            ForcePlace::Between { .. } => None,
+        }
+    }
 }
 
 /// A parameter to identify.
@@ -128,17 +140,76 @@ pub struct Attachment {
     pub position: [Node; 3],
 }
 
-/// A joint. In the reference configuration (coordinate zero) the two attachments coincide and the bodies' axes are
-/// parallel. The joint turns or shifts `child` relative to `parent`.
+/// A joint. In the reference configuration (all coordinates zero) the two attachments coincide and the bodies' axes are
+/// parallel, or turned by `orientation`. The joint turns and shifts `child` relative to `parent`.
 #[derive(Clone, Debug)]
 pub struct Joint {
     pub name: String,
     pub kind: JointKind,
     pub parent: Attachment,
     pub child: Attachment,
-    /// Symbols by which expressions refer to coordinate, rate and acceleration. `None` for fixed joints.
-    pub coordinate: Option<JointSymbols>,
+    /// Child axes to parent axes at coordinates zero; `None`: parallel.
+    pub orientation: Option<[[Node; 3]; 3]>,
+    /// Single motions, one after the other from parent to child: each moves the directions of those behind it.
+    pub axes: Vec<JointAxis>,
+    /// Free rotation behind the axes, as unit quaternion.
+    pub rotation: Option<RotationSymbols>,
+    /// Distance of the attachments, m, for [`JointKind::Distance`].
+    pub length: Option<Node>,
+    /// The joint does not carry a body but closes a kinematic loop: it becomes constraints.
+    pub closes_loop: bool,
     pub span: Span,
+}
+
+impl Joint {
+    /// The one axis of a joint that has no other freedom.
+    pub fn single_axis(&self) -> Option<&JointAxis> {
+        match (self.axes.as_slice(), self.rotation) {
+            ([axis], None) => Some(axis),
+            _ => None,
+        }
+    }
+}
+
+/// One single motion of a joint.
+#[derive(Clone, Debug)]
+pub struct JointAxis {
+    /// As places and paths name it: `slide` (the joint has this axis only), `wheelset.turn_z`.
+    pub name: String,
+    pub motion: AxisMotion,
+    pub symbols: JointSymbols,
+    /// Prescribed motion: the coordinate as expression of time, inputs and parameters.
+    pub prescribed: Option<Node>,
+}
+
+/// Unit vector in the axes of the parent (turned by the axes before it).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisMotion {
+    Shift([f64; 3]),
+    Turn([f64; 3]),
+}
+
+impl AxisMotion {
+    pub fn direction(self) -> [f64; 3] {
+        match self {
+            AxisMotion::Shift(axis) | AxisMotion::Turn(axis) => axis,
+        }
+    }
+
+    pub fn motion(self) -> Motion {
+        match self {
+            AxisMotion::Shift(_) => Motion::Translational,
+            AxisMotion::Turn(_) => Motion::Rotational,
+        }
+    }
+}
+
+/// Symbols of a free rotation: quaternion (scalar first), relative angular velocity and its derivative in the turned axes.
+#[derive(Clone, Copy, Debug)]
+pub struct RotationSymbols {
+    pub quaternion: [Symbol; 4],
+    pub velocity: [Symbol; 3],
+    pub acceleration: [Symbol; 3],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -151,12 +222,21 @@ pub struct JointSymbols {
     pub inertia: Symbol,
 }
 
-/// Axis as unit vector in parent axes.
-#[derive(Clone, Copy, Debug)]
+/// What the study calls the joint; its freedom is in [`Joint::axes`] and [`Joint::rotation`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
     Fixed,
-    Prismatic { axis: [f64; 3] },
-    Revolute { axis: [f64; 3] },
+    Prismatic,
+    Revolute,
+    Cylindrical,
+    Universal,
+    Planar,
+    Spherical,
+    Free,
+    /// Listed axes.
+    Axes,
+    /// Massless rod with balls at both ends: only the distance of the attachments is held.
+    Distance,
 }
 
 /// Translational places speak of length, velocity, force; rotational ones of angle, angular velocity, torque.
@@ -185,12 +265,23 @@ pub struct Force {
 
 #[derive(Clone, Copy, Debug)]
 pub enum ForcePlace {
-    /// Along (prismatic) or about (revolute) the axis of joint `index`; elongation = the joint's coordinate.
-    Joint(usize),
-    /// Between two points. With `along`, the elongation is the displacement of the second against the first
-    /// along this ground-fixed unit vector, measured from the reference configuration. Without, it is the distance
-    /// of the points minus `free_length`.
-    Between { first: Attachment, second: Attachment, along: Option<[f64; 3]>, free_length: Option<Node> },
+    /// Along or about one axis of a joint; elongation = the axis' coordinate.
+    Joint { joint: usize, axis: usize },
+    /// Between two points. With `along`, see [`ForceDirection`]. Without, the elongation is the distance of the points minus
+    /// `free_length`.
+    Between { first: Attachment, second: Attachment, along: Option<ForceDirection>, free_length: Option<Node> },
+}
+
+/// A direction for a force element: the elongation is the displacement of the second point against the first along it
+/// (translational, from the reference configuration), or the angle by which the second body is turned about it against
+/// the first (rotational).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceDirection {
+    /// Unit vector.
+    pub axis: [f64; 3],
+    /// The body in whose axes it is given and with which it turns; `None`: ground.
+    pub body: Option<usize>,
+    pub motion: Motion,
 }
 
 #[derive(Clone, Debug)]
@@ -233,6 +324,30 @@ pub enum PointMotion {
     Position,
     Velocity,
     Acceleration,
+    /// Of the body.
+    AngularVelocity,
+    AngularAcceleration,
+    /// The body's axis 0, 1, 2 as unit vector.
+    Axis(usize),
+}
+
+impl PointMotion {
+    /// Whether it follows from the loads at the same instant.
+    pub fn is_acceleration(self) -> bool {
+        matches!(self, PointMotion::Acceleration | PointMotion::AngularAcceleration)
+    }
+}
+
+/// `symbol` stands for one ground-axis component of what a joint transmits to its child, at its place.
+#[derive(Clone, Copy, Debug)]
+pub struct ReactionQuantity {
+    pub symbol: Symbol,
+    pub joint: usize,
+    /// Torque; else force.
+    pub is_moment: bool,
+    /// 0, 1, 2 for x, y, z.
+    pub axis: usize,
+    pub span: Span,
 }
 
 /// `symbol` stands for one ground-axis component of the motion of a point.

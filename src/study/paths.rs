@@ -3,8 +3,9 @@
 use super::checker::{Allowed, Checker, Entity, Key, Scope, Site};
 use super::evaluate::Typed;
 use super::kinds::{coordinate_dimension, rate_dimension};
-use super::model::{Attachment, Motion, PointMotion, PointQuantity};
+use super::model::{Attachment, Motion, PointMotion, PointQuantity, ReactionQuantity};
 use crate::diagnostics::{Code, Diagnostic, similar_name};
+use crate::expression::Symbol;
 use crate::quantities::Dimension;
 use crate::syntax::Name;
 
@@ -60,7 +61,7 @@ impl<'a> Checker<'a> {
             (Entity::Constant(_) | Entity::Input(_) | Entity::Measure(_), Some(rest)) => {
                 self.no_quantity(name, rest, &[])
             }
-            (Entity::Joint(_), None) => self.not_a_value(name, "a joint", "position"),
+            (Entity::Joint(_) | Entity::JointAxis(..), _) => self.not_a_value(name, "a joint", "position"),
             (Entity::Force(_), None) => self.not_a_value(name, "a force element", "force"),
             (Entity::Effect(_), None) => self.not_a_value(name, "an effect", "force"),
             (Entity::Body(_), None) => self.not_a_value(name, "a body", "position.z"),
@@ -107,19 +108,77 @@ impl<'a> Checker<'a> {
         self.fail(diagnostic, Scope::Study(allowed))
     }
 
+    /// `JOINT.position` of a joint with one axis, else `JOINT.turn_z.position`; `JOINT.quaternion.w`,
+    /// `JOINT.angular_velocity.x` of a free rotation; `JOINT.reaction.force.x`.
     fn joint_quantity(&mut self, index: usize, quantity: &str, name: &'a Name, allowed: Allowed) -> Option<Typed> {
         self.check_varies(name, allowed)?;
-        let Some((symbols, motion)) = self.joint_symbols.get(index).copied().flatten() else {
-            return self.no_quantity(name, quantity, &[]);
+        let freedom = self.topology.joint(index)?.freedom.clone();
+        if let Some(component) = quantity.strip_prefix("reaction.") {
+            return self.reaction_quantity(index, component, name);
+        }
+        let owner = &self.declared.joints[index].name.text;
+        let (axis_name, last) = match quantity.rsplit_once('.') {
+            Some((axis, last)) => (format!("{owner}.{axis}"), last),
+            None => (owner.clone(), quantity),
         };
-        let (symbol, dimension) = match quantity {
-            "position" => (symbols.position, coordinate_dimension(motion)),
-            "velocity" => (symbols.velocity, rate_dimension(motion)),
-            "acceleration" => (symbols.acceleration, rate_dimension(motion) / Dimension::TIME),
-            _ => return self.no_quantity(name, quantity, &["position", "velocity", "acceleration"]),
+        if let Some(axis) = freedom.axes.iter().find(|axis| axis.name == axis_name) {
+            let (symbols, motion) = (axis.symbols, axis.motion.motion());
+            let found = match last {
+                "position" => Some((symbols.position, coordinate_dimension(motion))),
+                "velocity" => Some((symbols.velocity, rate_dimension(motion))),
+                "acceleration" => Some((symbols.acceleration, rate_dimension(motion) / Dimension::TIME)),
+                _ => None,
+            };
+            if let Some((symbol, dimension)) = found {
+                let value = Typed::new(self.graph.variable(symbol), dimension);
+                return self.check_accelerations(value, name, allowed);
+            }
+        }
+        let rate = Dimension::ONE / Dimension::TIME;
+        let mut known: Vec<(String, Symbol, Dimension)> = Vec::new();
+        let mut add = |checker: &Self, symbols: &[Symbol], dimension: Dimension| {
+            known.extend(
+                symbols.iter().map(|&symbol| (checker.graph.symbol_name(symbol).to_owned(), symbol, dimension)),
+            );
         };
-        let value = Typed::new(self.graph.variable(symbol), dimension);
-        self.check_accelerations(value, name, allowed)
+        for axis in &freedom.axes {
+            let dimension = rate_dimension(axis.motion.motion());
+            add(self, &[axis.symbols.position], dimension * Dimension::TIME);
+            add(self, &[axis.symbols.velocity], dimension);
+            add(self, &[axis.symbols.acceleration], dimension / Dimension::TIME);
+        }
+        if let Some(rotation) = &freedom.rotation {
+            add(self, &rotation.quaternion, Dimension::ONE);
+            add(self, &rotation.velocity, rate);
+            add(self, &rotation.acceleration, rate / Dimension::TIME);
+        }
+        if let Some((_, symbol, dimension)) = known.iter().find(|(path, ..)| *path == name.text) {
+            let value = Typed::new(self.graph.variable(*symbol), *dimension);
+            return self.check_accelerations(value, name, allowed);
+        }
+        let prefix = format!("{owner}.");
+        let mut words: Vec<&str> = known.iter().filter_map(|(path, ..)| path.strip_prefix(&prefix)).collect();
+        words.extend(["reaction.force.x", "reaction.moment.x"]);
+        self.no_quantity(name, quantity, &words)
+    }
+
+    /// `force.x`, `moment.z`: what the joint transmits to its child, ground axes.
+    fn reaction_quantity(&mut self, joint: usize, component: &str, name: &'a Name) -> Option<Typed> {
+        let (is_moment, axis) = match component.split_once('.') {
+            Some(("force", axis)) => (false, axis),
+            Some(("moment", axis)) => (true, axis),
+            _ => (false, ""),
+        };
+        let Some(axis) = ["x", "y", "z"].iter().position(|letter| *letter == axis) else {
+            return self.no_quantity(name, component, &["reaction.force.x", "reaction.moment.x"]);
+        };
+        let dimension = if is_moment { Dimension::TORQUE } else { Dimension::FORCE };
+        let symbol = self.graph.symbol(&name.text);
+        let is_new = self.reactions.iter().all(|reaction| reaction.symbol != symbol);
+        if is_new {
+            self.reactions.push(ReactionQuantity { symbol, joint, is_moment, axis, span: name.span });
+        }
+        Some(Typed::new(self.graph.variable(symbol), dimension))
     }
 
     fn force_quantity(&mut self, index: usize, quantity: &'a str, name: &'a Name, allowed: Allowed) -> Option<Typed> {
@@ -198,6 +257,11 @@ impl<'a> Checker<'a> {
             "position" => PointMotion::Position,
             "velocity" => PointMotion::Velocity,
             "acceleration" => PointMotion::Acceleration,
+            "angular_velocity" if point.is_none() => PointMotion::AngularVelocity,
+            "angular_acceleration" if point.is_none() => PointMotion::AngularAcceleration,
+            "axis_x" if point.is_none() => PointMotion::Axis(0),
+            "axis_y" if point.is_none() => PointMotion::Axis(1),
+            "axis_z" if point.is_none() => PointMotion::Axis(2),
             _ => return self.unknown_body_quantity(index, name),
         };
         let Some(axis) = ["x", "y", "z"].iter().position(|letter| *letter == axis) else {
@@ -215,10 +279,13 @@ impl<'a> Checker<'a> {
             PointMotion::Position => Dimension::LENGTH,
             PointMotion::Velocity => Dimension::VELOCITY,
             PointMotion::Acceleration => Dimension::ACCELERATION,
+            PointMotion::AngularVelocity => Dimension::ONE / Dimension::TIME,
+            PointMotion::AngularAcceleration => Dimension::ONE / Dimension::TIME / Dimension::TIME,
+            PointMotion::Axis(_) => Dimension::ONE,
         };
         if !self.point_quantities.iter().any(|quantity| quantity.symbol == symbol) {
             self.point_quantities.push(PointQuantity { symbol, point, motion, axis });
-            if motion == PointMotion::Acceleration {
+            if motion.is_acceleration() {
                 self.accelerations.insert(symbol);
             }
         }
@@ -233,7 +300,8 @@ impl<'a> Checker<'a> {
         let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("`{}` is no quantity of a body", name.text))
             .label(name.span, "not known")
             .help(format!(
-                "write `{body_name}.position.z` or `{body_name}.POINT.position.z`, also with `velocity`, `acceleration` and x, y, z"
+                "write `{body_name}.position.z` or `{body_name}.POINT.position.z`, also with `velocity`, `acceleration` and x, y, z; \
+                 of the body `angular_velocity.z`, `angular_acceleration.z`, `axis_x.z`"
             ))
             .note(format!("points of `{body_name}`: {}", points.join(", ")));
         self.fail(diagnostic, Scope::Study(Allowed::Motion))
@@ -277,7 +345,7 @@ impl<'a> Checker<'a> {
     /// The motion of a joint or of a force's place.
     pub fn entity_motion(&self, entity: Entity) -> Option<Motion> {
         match entity {
-            Entity::Joint(index) => self.joint_symbols.get(index)?.map(|(_, motion)| motion),
+            Entity::JointAxis(joint, axis) => self.axis_entry(joint, axis).map(|axis| axis.motion.motion()),
             Entity::Force(index) => {
                 let load = self.instances[self.force_instances.get(index).copied().flatten()?].kinds.load;
                 Some(if load == Some(Dimension::TORQUE) { Motion::Rotational } else { Motion::Translational })

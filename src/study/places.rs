@@ -2,7 +2,7 @@
 
 use super::checker::{Checker, Entity, Site};
 use super::kinds::load_dimension;
-use super::model::{Force, ForcePlace, JointKind, JointSymbols, Measure, Place, PlaceKind, PlaceQuantity};
+use super::model::{AxisMotion, Force, ForcePlace, JointSymbols, Measure, Place, PlaceKind, PlaceQuantity};
 use crate::expression::Node;
 use crate::quantities::Dimension;
 
@@ -12,7 +12,10 @@ impl<'a> Checker<'a> {
         let declared: &'a super::declarations::Declarations<'a> = self.declared;
         let mut places = Vec::new();
         for joint in 0..declared.joints.len() {
-            places.extend(self.joint_place(joint, forces));
+            let axes = self.topology.joint(joint).map_or(0, |read| read.freedom.axes.len());
+            for axis in 0..axes {
+                places.extend(self.joint_place(joint, axis, forces));
+            }
         }
         for force in 0..declared.forces.len() {
             places.extend(self.force_place_entry(force));
@@ -36,14 +39,18 @@ impl<'a> Checker<'a> {
         places
     }
 
-    fn joint_place(&mut self, joint: usize, forces: &[Force]) -> Option<Place> {
-        let (symbols, motion) = self.joint_symbols.get(joint).copied().flatten()?;
+    /// Motion that is prescribed or follows from a closed loop leaves no room for a load of its own.
+    fn joint_place(&mut self, joint: usize, axis: usize, forces: &[Force]) -> Option<Place> {
+        if self.topology.closes_loop[joint] || self.is_prescribed(joint, axis) {
+            return None;
+        }
+        let entry = self.axis_entry(joint, axis)?.clone();
+        let (symbols, motion, name) = (entry.symbols, entry.motion.motion(), entry.name);
         let position = self.graph.variable(symbols.position);
         let velocity = self.graph.variable(symbols.velocity);
         let mut probes = vec![(PlaceQuantity::Coordinate, position), (PlaceQuantity::Rate, velocity)];
-        let load = self.joint_load(joint, forces);
+        let load = self.joint_load(joint, axis, forces);
         probes.push((PlaceQuantity::Load, self.load_magnitude(symbols, load)));
-        let name = self.declared.joints[joint].name.text.clone();
         let dimension = load_dimension(motion);
         Some(Place { kind: PlaceKind::Joint, name, motion: Some(motion), dimension, ports: Vec::new(), probes })
     }
@@ -62,18 +69,23 @@ impl<'a> Checker<'a> {
     }
 
     /// Sum of the loads in the joint's direction; `None` where no element can be projected on it.
-    fn joint_load(&mut self, joint: usize, forces: &[Force]) -> Option<Node> {
-        let (kind, _, child) = self.topology.joints.get(joint).copied().flatten()?;
+    fn joint_load(&mut self, joint: usize, axis: usize, forces: &[Force]) -> Option<Node> {
+        let read = self.topology.joint(joint)?;
+        let (child, motion) = (read.child, read.freedom.axes.get(axis)?.motion);
         let mut sum: Option<Node> = None;
         for force in forces {
             let sign = match force.place {
-                ForcePlace::Joint(index) => f64::from(u8::from(self.joint_position(joint) == Some(index))),
+                ForcePlace::Joint { joint: index, axis: at } => {
+                    f64::from(u8::from(self.joint_position(joint) == Some(index) && at == axis))
+                }
                 ForcePlace::Between { first, second, along, .. } => {
                     let side =
                         f64::from(u8::from(second.body == child.body)) - f64::from(u8::from(first.body == child.body));
-                    match (kind, along) {
-                        (JointKind::Prismatic { axis }, Some(along)) => side * dot(axis, along),
-                        (JointKind::Prismatic { .. }, None) => side,
+                    match (motion, along) {
+                        (_, Some(along)) if along.motion == motion.motion() => {
+                            side * dot(motion.direction(), along.axis)
+                        }
+                        (AxisMotion::Shift(_), None) => side,
                         _ => 0.0,
                     }
                 }
@@ -92,7 +104,7 @@ impl<'a> Checker<'a> {
 
     /// Index of a declared joint among the finished ones.
     pub fn joint_position(&self, joint: usize) -> Option<usize> {
-        let present = self.topology.order.iter().filter(|index| self.topology.joints[**index].is_some());
+        let present = self.topology.order.iter().filter(|index| self.topology.joint(**index).is_some());
         present.copied().position(|index| index == joint)
     }
 

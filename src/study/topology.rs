@@ -1,10 +1,11 @@
-//! Bodies and joints: a tree that starts at ground.
+//! Bodies and joints: which joints carry the bodies, which close loops.
 
 use super::checker::{Allowed, Checker, Scope};
-use super::model::{JointKind, JointSymbols, Motion};
+use super::joints::JointFreedom;
+use super::model::{AxisMotion, JointKind};
 use crate::diagnostics::{Code, Diagnostic, similar_name};
-use crate::quantities::Dimension;
-use crate::syntax::{Direction, DirectionKind, Name};
+use crate::syntax::{ElementPlace, Name};
+use std::collections::VecDeque;
 
 const SCOPE: Scope = Scope::Study(Allowed::Number);
 
@@ -15,16 +16,37 @@ pub(super) struct End<'a> {
     pub point: Option<&'a str>,
 }
 
-/// Per declared joint its kind and ends (`None` after an error), per body the joint that carries it, and the joints
-/// ordered so that parents come before children.
+/// A joint as far as it could be read.
+#[derive(Clone, Debug)]
+pub(super) struct ReadJoint<'a> {
+    pub freedom: JointFreedom,
+    pub parent: End<'a>,
+    pub child: End<'a>,
+}
+
+impl<'a> ReadJoint<'a> {
+    /// Near and far end seen from `body`.
+    pub fn seen_from(&self, body: Option<usize>) -> (End<'a>, End<'a>) {
+        if self.parent.body == body { (self.parent, self.child) } else { (self.child, self.parent) }
+    }
+}
+
+/// Per declared joint what was read (`None` after an error), per body the joint that carries it, and the joints
+/// ordered so that inner ones come before outer ones.
 #[derive(Default)]
 pub(super) struct Topology<'a> {
-    pub joints: Vec<Option<(JointKind, End<'a>, End<'a>)>>,
+    pub joints: Vec<Option<ReadJoint<'a>>>,
+    /// Per declared joint: it is not part of the spanning tree.
+    pub closes_loop: Vec<bool>,
     pub carrier: Vec<Option<usize>>,
     pub order: Vec<usize>,
 }
 
-impl Topology<'_> {
+impl<'a> Topology<'a> {
+    pub fn joint(&self, joint: usize) -> Option<&ReadJoint<'a>> {
+        self.joints.get(joint)?.as_ref()
+    }
+
     /// Joints from a body down to ground. Ends early where the tree is broken.
     pub fn chain(&self, body: Option<usize>) -> Vec<usize> {
         let mut chain = Vec::new();
@@ -34,32 +56,30 @@ impl Topology<'_> {
                 break;
             }
             chain.push(joint);
-            current = self.joints.get(joint).and_then(Option::as_ref).and_then(|(_, parent, _)| parent.body);
+            current = self.joint(joint).and_then(|read| read.seen_from(current).1.body);
         }
         chain
     }
 
-    pub fn kind(&self, joint: usize) -> Option<JointKind> {
-        self.joints.get(joint)?.as_ref().map(|(kind, ..)| *kind)
-    }
-
-    /// Whether a revolute joint turns this body.
+    /// Whether a joint turns this body.
     pub fn turns(&self, body: usize) -> bool {
-        self.chain(Some(body)).into_iter().any(|joint| matches!(self.kind(joint), Some(JointKind::Revolute { .. })))
+        self.chain(Some(body)).into_iter().any(|joint| self.joint(joint).is_none_or(|read| read.freedom.turns()))
     }
 
     /// The axis along which two bodies can only shift against each other, if there is one: no joint turns them, and
     /// the joints between them share one direction.
     pub fn common_axis(&self, first: Option<usize>, second: Option<usize>) -> Option<[f64; 3]> {
         let (a, b) = (self.chain(first), self.chain(second));
-        let turns = |joint: &usize| matches!(self.kind(*joint), Some(JointKind::Revolute { .. }) | None);
+        let turns =
+            |joint: &usize| self.joint(*joint).is_none_or(|read| read.freedom.turns() || read.freedom.is_turned);
         if a.iter().chain(&b).any(turns) {
             return None;
         }
         let mut axis: Option<[f64; 3]> = None;
         let own_of_second = b.iter().filter(|joint| !a.contains(joint));
         for joint in own_of_second.chain(a.iter().filter(|joint| !b.contains(joint))) {
-            if let Some(JointKind::Prismatic { axis: own }) = self.kind(*joint) {
+            for entry in self.joint(*joint).into_iter().flat_map(|read| &read.freedom.axes) {
+                let AxisMotion::Shift(own) = entry.motion else { return None };
                 match axis {
                     None => axis = Some(own),
                     Some(known) if is_parallel(known, own) => {}
@@ -71,101 +91,56 @@ impl Topology<'_> {
     }
 }
 
-fn is_parallel(a: [f64; 3], b: [f64; 3]) -> bool {
+pub(super) fn is_parallel(a: [f64; 3], b: [f64; 3]) -> bool {
     let cosine: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
     (cosine.abs() - 1.0).abs() < 1e-12
 }
 
 impl<'a> Checker<'a> {
-    /// Reads all joints and checks that they form a tree on ground.
+    /// Reads all joints, chooses the spanning tree and checks that it reaches every body.
     pub fn read_topology(&mut self) {
-        for joint in &self.declared.joints {
-            let owner = format!("joint `{}`", joint.name.text);
-            self.known_fields(&owner, joint.fields, &[]);
-            let kind = self.joint_kind(joint.kind, joint.axis);
-            let (parent, child) = (self.end(joint.parent), self.end(joint.child));
-            self.topology.joints.push(match (kind, parent, child) {
-                (Some(kind), Some(parent), Some(child)) => Some((kind, parent, child)),
+        for index in 0..self.declared.joints.len() {
+            let declared = &self.declared.joints[index];
+            let owner = format!("joint `{}`", declared.name.text);
+            let known: &[&'static str] =
+                if declared.kind.text == "distance" { &["length"] } else { &["orientation", "motion"] };
+            self.known_fields(&owner, declared.fields, known);
+            let freedom = self.joint_freedom(index);
+            let (parent, child) = (self.end(declared.parent), self.end(declared.child));
+            let read = match (freedom, parent, child) {
+                (Some(freedom), Some(parent), Some(child)) => self.two_bodies(index, freedom, parent, child),
                 _ => None,
-            });
-            let motion = match kind {
-                Some(JointKind::Prismatic { .. }) => Some(Motion::Translational),
-                Some(JointKind::Revolute { .. }) => Some(Motion::Rotational),
-                Some(JointKind::Fixed) | None => None,
             };
-            let symbols = motion.map(|motion| (self.joint_symbols_of(&joint.name.text), motion));
-            self.joint_symbols.push(symbols);
+            if let Some(read) = &read {
+                for (at, axis) in read.freedom.axes.iter().enumerate() {
+                    self.axis_index.insert(axis.name.clone(), (index, at));
+                    self.accelerations.insert(axis.symbols.acceleration);
+                }
+                for symbols in read.freedom.rotation.iter() {
+                    self.accelerations.extend(symbols.acceleration);
+                }
+            }
+            self.topology.joints.push(read);
         }
-        self.find_carriers();
+        self.choose_tree();
         self.check_connected();
-        self.order_joints();
     }
 
-    fn joint_symbols_of(&mut self, name: &str) -> JointSymbols {
-        let mut symbol = |quantity: &str| self.graph.symbol(&format!("{name}.{quantity}"));
-        let symbols = JointSymbols {
-            position: symbol("position"),
-            velocity: symbol("velocity"),
-            acceleration: symbol("acceleration"),
-            inertia: symbol("inertia"),
-        };
-        self.accelerations.insert(symbols.acceleration);
-        symbols
-    }
-
-    fn joint_kind(&mut self, kind: &'a Name, axis: Option<&'a Direction>) -> Option<JointKind> {
-        const KINDS: [&str; 3] = ["prismatic", "revolute", "fixed"];
-        if !KINDS.contains(&kind.text.as_str()) {
-            let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no joint kind `{}`", kind.text))
-                .label(kind.span, "not known")
-                .suggest(similar_name(&kind.text, KINDS))
-                .note(format!("kinds: {}", KINDS.join(", ")));
-            return self.fail(diagnostic, SCOPE);
+    fn two_bodies(
+        &mut self,
+        index: usize,
+        freedom: JointFreedom,
+        parent: End<'a>,
+        child: End<'a>,
+    ) -> Option<ReadJoint<'a>> {
+        if parent.body != child.body {
+            return Some(ReadJoint { freedom, parent, child });
         }
-        match (kind.text.as_str(), axis) {
-            ("fixed", None) => Some(JointKind::Fixed),
-            ("fixed", Some(axis)) => {
-                let diagnostic =
-                    Diagnostic::error(Code::AXIS, "a fixed joint has no axis").label(axis.span, "remove it");
-                self.fail(diagnostic, SCOPE)
-            }
-            (_, None) => {
-                let diagnostic = Diagnostic::error(Code::AXIS, format!("a {} joint needs an axis", kind.text))
-                    .label(kind.span, "no axis given")
-                    .help(format!("write e.g. `{}(z)`", kind.text));
-                self.fail(diagnostic, SCOPE)
-            }
-            (name, Some(axis)) => {
-                let axis = self.direction(axis)?;
-                Some(if name == "prismatic" { JointKind::Prismatic { axis } } else { JointKind::Revolute { axis } })
-            }
-        }
-    }
-
-    /// A direction as unit vector.
-    pub fn direction(&mut self, direction: &'a Direction) -> Option<[f64; 3]> {
-        let vector = match &direction.kind {
-            DirectionKind::Axis { axis, negative } => {
-                let mut vector = [0.0; 3];
-                *vector.get_mut(*axis)? = if *negative { -1.0 } else { 1.0 };
-                return Some(vector);
-            }
-            DirectionKind::Vector(vector) => vector,
-        };
-        let what = (direction.span, "a direction has");
-        let values: Vec<Option<f64>> =
-            vector.iter().map(|component| self.fixed_number(component, None, Dimension::ONE, what)).collect();
-        let values: Vec<f64> = values.into_iter().collect::<Option<_>>()?;
-        let length = values.iter().map(|value| value * value).sum::<f64>().sqrt();
-        match values.as_slice() {
-            [x, y, z] if length > 0.0 && length.is_finite() => Some([x / length, y / length, z / length]),
-            _ => {
-                let diagnostic =
-                    Diagnostic::error(Code::AXIS, "a direction is `x`, `y`, `z`, or three numbers not all zero")
-                        .label(direction.span, "not a direction");
-                self.fail(diagnostic, SCOPE)
-            }
-        }
+        let joint = &self.declared.joints[index];
+        let diagnostic =
+            Diagnostic::error(Code::SAME_BODY, format!("joint `{}` joins a body to itself", joint.name.text))
+                .label(joint.parent.span.to(joint.child.span), "the same body twice");
+        self.fail(diagnostic, SCOPE)
     }
 
     /// `ground`, `BODY`, `BODY.POINT`, `ground.POINT`.
@@ -204,142 +179,130 @@ impl<'a> Checker<'a> {
         Some(End { body, point })
     }
 
-    fn find_carriers(&mut self) {
-        self.topology.carrier = vec![None; self.declared.bodies.len()];
-        for index in 0..self.topology.joints.len() {
-            let Some((_, parent, child)) = self.topology.joints[index] else { continue };
-            let joint = &self.declared.joints[index];
-            if parent.body == child.body {
-                let diagnostic =
-                    Diagnostic::error(Code::SAME_BODY, format!("joint `{}` joins a body to itself", joint.name.text))
-                        .label(joint.parent.span.to(joint.child.span), "the same body twice");
-                self.report(diagnostic, SCOPE);
-                self.topology.joints[index] = None;
+    /// Joints that carry elements come first, then those with the least freedom, so that loops are closed where the fewest
+    /// constraints arise; among equals the ones declared first.
+    fn choose_tree(&mut self) {
+        let ground = self.declared.bodies.len();
+        let node = |end: End| end.body.unwrap_or(ground);
+        let on_places: Vec<&str> = (self.declared.forces.iter().chain(&self.declared.effects))
+            .filter_map(|element| match element.place {
+                ElementPlace::On(name) => Some(name.text.as_str()),
+                _ => None,
+            })
+            .collect();
+        let carries_elements =
+            |read: &ReadJoint| read.freedom.axes.iter().any(|a| on_places.contains(&a.name.as_str()));
+        let mut candidates: Vec<usize> = (0..self.topology.joints.len())
+            .filter(|joint| self.topology.joint(*joint).is_some_and(|read| read.freedom.kind != JointKind::Distance))
+            .collect();
+        candidates.sort_by_key(|joint| {
+            self.topology.joint(*joint).map(|read| (!carries_elements(read), read.freedom.degrees_of_freedom()))
+        });
+        let mut closes_loop: Vec<bool> = self.topology.joints.iter().map(Option::is_some).collect();
+        let mut group: Vec<usize> = (0..=ground).collect();
+        let mut joints_at: Vec<Vec<usize>> = vec![Vec::new(); ground + 1];
+        for joint in candidates {
+            let Some(read) = self.topology.joint(joint) else { continue };
+            let (kept, merged) = (group[node(read.parent)], group[node(read.child)]);
+            if kept == merged {
                 continue;
             }
-            let Some(body) = child.body else {
-                let diagnostic = Diagnostic::error(Code::UNCONNECTED_BODY, "ground cannot be carried by a joint")
-                    .label(joint.child.span, "stands on the side of the child")
-                    .help(format!("turn the arrow: `ground -> {}`", joint.parent.text));
-                self.report(diagnostic, SCOPE);
-                self.topology.joints[index] = None;
-                continue;
-            };
-            match self.topology.carrier[body] {
-                None => self.topology.carrier[body] = Some(index),
-                Some(first) => self.report_loop(body, first, index),
+            closes_loop[joint] = false;
+            group.iter_mut().filter(|member| **member == merged).for_each(|member| *member = kept);
+            joints_at[node(read.parent)].push(joint);
+            joints_at[node(read.child)].push(joint);
+        }
+        self.topology.closes_loop = closes_loop;
+        self.walk_tree(ground, joints_at);
+    }
+
+    fn walk_tree(&mut self, ground: usize, mut joints_at: Vec<Vec<usize>>) {
+        let mut carrier: Vec<Option<usize>> = vec![None; ground];
+        let mut depth = vec![0_usize; self.topology.joints.len()];
+        let mut queue = VecDeque::from([(ground, 0)]);
+        while let Some((from, level)) = queue.pop_front() {
+            joints_at[from].sort_unstable();
+            let body = (from < ground).then_some(from);
+            for &joint in &joints_at[from] {
+                let Some(read) = self.topology.joint(joint) else { continue };
+                let Some(to) = read.seen_from(body).1.body else { continue };
+                if body.is_some_and(|body| carrier[body] == Some(joint)) || carrier[to].is_some() {
+                    continue;
+                }
+                carrier[to] = Some(joint);
+                depth[joint] = level + 1;
+                queue.push_back((to, level + 1));
             }
         }
+        self.topology.carrier = carrier;
+        let mut order: Vec<usize> = (0..self.topology.joints.len()).collect();
+        let inner_first = |joint: &usize| {
+            let read = self.topology.joint(*joint);
+            let inner = read.and_then(|read| match depth[*joint] {
+                0 => None,
+                _ => [read.parent.body, read.child.body]
+                    .into_iter()
+                    .map(|body| self.topology.chain(body))
+                    .min_by_key(Vec::len),
+            });
+            inner.is_none_or(|chain| chain.iter().all(|ancestor| ancestor < joint))
+        };
+        if !order.iter().all(inner_first) {
+            order.sort_by_key(|joint| depth[*joint]);
+        }
+        self.topology.order = order;
     }
 
-    fn report_loop(&mut self, body: usize, first: usize, second: usize) {
-        let (body, joints) = (&self.declared.bodies[body].name.text, &self.declared.joints);
-        let (first, second) = (&joints[first], &joints[second]);
-        let message = format!("`{body}` is carried by two joints, `{}` and `{}`", first.name.text, second.name.text);
-        let diagnostic = Diagnostic::error(Code::CLOSED_LOOP, message)
-            .label(second.child.span, "the second joint closes a loop")
-            .secondary(first.child.span, "the first joint")
-            .help("loops are not supported yet; the arrow of a joint leads away from ground")
-            .note("each body hangs on exactly one joint, `PARENT -> CHILD`, so that the joints form a tree on ground");
-        self.report(diagnostic, SCOPE);
-    }
-
-    /// Every body leads to ground; a part that does not is reported once.
+    /// Every body leads to ground; parts that do not are reported once, with what hangs on them.
     fn check_connected(&mut self) {
         let count = self.declared.bodies.len();
-        let mut reported = vec![false; count];
-        for body in 0..count {
-            let (root, is_circle) = self.root_of(body);
-            let Some(root) = root else { continue };
-            if is_circle {
-                let members = self.circle_of(root);
-                if !members.iter().any(|member| reported[*member]) {
-                    self.report_circle(&members);
-                }
-                members.into_iter().for_each(|member| reported[member] = true);
-            } else if !std::mem::replace(&mut reported[root], true) && !self.is_child_of_broken_joint(root) {
-                self.report_unconnected(root);
+        let mut part: Vec<usize> = (0..count).collect();
+        for read in self.topology.joints.iter().flatten() {
+            if let (Some(a), Some(b)) = (read.parent.body, read.child.body)
+                && read.freedom.kind != JointKind::Distance
+            {
+                let (kept, merged) = (part[a].min(part[b]), part[a].max(part[b]));
+                part.iter_mut().filter(|member| **member == merged).for_each(|member| *member = kept);
+            }
+        }
+        let is_loose: Vec<bool> =
+            (0..count).map(|body| self.topology.carrier[body].is_none() && !self.is_at_broken_joint(body)).collect();
+        let roots: Vec<usize> = (0..count).filter(|&body| part[body] == body).collect();
+        for root in roots {
+            let members: Vec<usize> = (0..count).filter(|&body| part[body] == root).collect();
+            if members.iter().all(|&body| is_loose[body]) {
+                self.report_unconnected(&members);
             }
         }
     }
 
-    /// `None` if the body leads to ground; else the body where the chain ends (or a member of the circle it runs in).
-    fn root_of(&self, body: usize) -> (Option<usize>, bool) {
-        let mut seen = vec![body];
-        let mut current = body;
-        loop {
-            let Some(joint) = self.topology.carrier[current] else { return (Some(current), false) };
-            let Some((_, parent, _)) = &self.topology.joints[joint] else { return (None, false) };
-            let Some(next) = parent.body else { return (None, false) };
-            if seen.contains(&next) {
-                return (Some(next), true);
-            }
-            seen.push(next);
-            current = next;
-        }
-    }
-
-    fn circle_of(&self, body: usize) -> Vec<usize> {
-        let mut members = vec![body];
-        let mut current = body;
-        while let Some((_, parent, _)) = self.topology.carrier[current].and_then(|joint| self.topology.joints[joint])
-            && let Some(next) = parent.body
-            && !members.contains(&next)
-        {
-            members.push(next);
-            current = next;
-        }
-        members
-    }
-
-    fn report_circle(&mut self, members: &[usize]) {
-        let joints: Vec<usize> = members.iter().filter_map(|body| self.topology.carrier[*body]).collect();
-        let names: Vec<String> =
-            joints.iter().map(|joint| format!("`{}`", self.declared.joints[*joint].name.text)).collect();
-        let message = format!("the joints {} form a loop that never reaches ground", names.join(", "));
-        let mut diagnostic = Diagnostic::error(Code::CLOSED_LOOP, message);
-        for joint in joints {
-            diagnostic = diagnostic.label(self.declared.joints[joint].name.span, "part of the loop");
-        }
-        self.report(diagnostic.help("loops are not supported yet; let one of the joints start at `ground`"), SCOPE);
-    }
-
-    fn is_child_of_broken_joint(&self, body: usize) -> bool {
+    fn is_at_broken_joint(&self, body: usize) -> bool {
         let name = &self.declared.bodies[body].name.text;
         let broken = self.declared.joints.iter().zip(&self.topology.joints).filter(|(_, read)| read.is_none());
-        broken.into_iter().any(|(joint, _)| self.split_path(&joint.child.text).0 == name)
+        let stands_at = |end: &Name| self.split_path(&end.text).0 == name;
+        broken.into_iter().any(|(joint, _)| stands_at(joint.parent) || stands_at(joint.child))
     }
 
-    fn report_unconnected(&mut self, root: usize) {
+    fn report_unconnected(&mut self, members: &[usize]) {
+        let is_child = |body: &usize| self.topology.joints.iter().flatten().any(|read| read.child.body == Some(*body));
+        let root = members.iter().copied().find(|body| !is_child(body)).or(members.first().copied());
+        let Some(root) = root else { return };
         let name = &self.declared.bodies[root].name;
-        let others: Vec<String> = (0..self.declared.bodies.len())
-            .filter(|body| *body != root && self.root_of(*body).0 == Some(root))
-            .map(|body| format!("`{}`", self.declared.bodies[body].name.text))
+        let others: Vec<String> = members
+            .iter()
+            .filter(|body| **body != root)
+            .map(|body| format!("`{}`", self.declared.bodies[*body].name.text))
             .collect();
         let mut diagnostic =
             Diagnostic::error(Code::UNCONNECTED_BODY, format!("body `{}` is not connected to ground", name.text))
-                .label(name.span, "no joint carries it")
-                .help(format!("add a joint, e.g. `joint {}_guide: prismatic(z) ground -> {}`", name.text, name.text));
+                .label(name.span, "no chain of joints leads from ground to here")
+                .help(format!(
+                    "add a joint, e.g. `joint {}_guide: prismatic(z) ground -> {}`, or `free`",
+                    name.text, name.text
+                ));
         if !others.is_empty() {
             diagnostic = diagnostic.note(format!("with it: {}", others.join(", ")));
         }
         self.report(diagnostic, SCOPE);
-    }
-
-    /// Parents before children, else in order of declaration.
-    fn order_joints(&mut self) {
-        let depth = |joint: &usize| {
-            let parent = self.topology.joints[*joint].as_ref().and_then(|(_, parent, _)| parent.body);
-            self.topology.chain(parent).len()
-        };
-        let mut order: Vec<usize> = (0..self.declared.joints.len()).collect();
-        let is_ordered = order.iter().all(|joint| {
-            let parent = self.topology.joints[*joint].as_ref().and_then(|(_, parent, _)| parent.body);
-            self.topology.chain(parent).iter().all(|ancestor| ancestor < joint)
-        });
-        if !is_ordered {
-            order.sort_by_key(depth);
-        }
-        self.topology.order = order;
     }
 }

@@ -260,26 +260,52 @@ impl<'a> Builder<'a> {
     fn joint(&mut self, mut parts: Parts<'_>) -> Built<ItemKind> {
         let name = self.name(parts.next()?);
         let kind = self.name(parts.next()?);
-        let axis = match parts.take(Rule::joint_axis) {
-            Some(pair) => Some(self.joint_axis(pair)?),
-            None => None,
+        let axes = match parts.take(Rule::joint_axes) {
+            Some(pair) => self.joint_axes(pair)?,
+            None => Vec::new(),
         };
         let parent = self.name(parts.next()?);
         let child = self.name(parts.next()?);
-        Some(ItemKind::Joint { name, kind, axis, parent, child, fields: self.optional_fields(&mut parts) })
+        Some(ItemKind::Joint { name, kind, axes, parent, child, fields: self.optional_fields(&mut parts) })
     }
 
-    fn joint_axis(&mut self, pair: Pair<'_, Rule>) -> Built<Direction> {
+    fn joint_axes(&mut self, pair: Pair<'_, Rule>) -> Built<Vec<JointAxis>> {
         let span = self.span(&pair);
         let mut parts = Parts::of(pair);
-        if let Some(axis) = parts.take(Rule::axis) {
-            return Some(Direction { kind: axis_kind(axis.as_str())?, span: self.span(&axis) });
-        }
-        let mut components = Vec::new();
+        let mut axes = Vec::new();
+        let mut bare = Vec::new();
         while let Some(pair) = parts.next() {
-            components.push(self.expression(pair));
+            let span = self.span(&pair);
+            let mut inside = Parts::of(pair);
+            let motion = inside.take(Rule::joint_motion).map(|pair| self.name(pair));
+            let what = inside.next()?;
+            let direction_span = self.span(&what);
+            let kind = match what.as_rule() {
+                Rule::axis => axis_kind(what.as_str())?,
+                _ => match self.tuple_of(&what) {
+                    Some(components) => DirectionKind::Vector(components),
+                    None => {
+                        bare.push(self.expression(what));
+                        continue;
+                    }
+                },
+            };
+            if !bare.is_empty() {
+                self.report(
+                    Code::UNEXPECTED_TEXT,
+                    "axes and single numbers cannot be mixed",
+                    span,
+                    "write several axes as `(x, z)`, or each in its own parenthesis: `((1, 0, 0), (0, 0.6, 0.8))`",
+                );
+                return None;
+            }
+            axes.push(JointAxis { motion, direction: Direction { kind, span: direction_span } });
         }
-        Some(Direction { kind: DirectionKind::Vector(components), span })
+        if !bare.is_empty() {
+            let direction = Direction { kind: DirectionKind::Vector(bare), span };
+            axes.push(JointAxis { motion: None, direction });
+        }
+        Some(axes)
     }
 
     fn direction(&mut self, pair: Pair<'_, Rule>) -> Built<Direction> {
@@ -287,6 +313,11 @@ impl<'a> Builder<'a> {
         let inside = Parts::of(pair).next()?;
         let kind = match inside.as_rule() {
             Rule::axis => axis_kind(inside.as_str())?,
+            Rule::body_axis => {
+                let mut parts = Parts::of(inside);
+                let negative = parts.take(Rule::sign).is_some();
+                DirectionKind::OfBody { path: self.name(parts.next()?), negative }
+            }
             _ => DirectionKind::Vector(self.expressions(inside)),
         };
         Some(Direction { kind, span })
@@ -315,11 +346,15 @@ impl<'a> Builder<'a> {
         let mut parts = Parts::of(pair);
         let first = self.name(parts.next()?);
         let second = self.name(parts.next()?);
-        let along = match parts.take(Rule::direction) {
-            Some(pair) => Some(self.direction(pair)?),
+        let use_of_axis = match parts.take(Rule::about_word) {
+            Some(_) => PlaceAxis::About,
+            None => PlaceAxis::Along,
+        };
+        let axis = match parts.take(Rule::direction) {
+            Some(pair) => Some((use_of_axis, self.direction(pair)?)),
             None => None,
         };
-        Some(ElementPlace::Between { first, second, along })
+        Some(ElementPlace::Between { first, second, axis })
     }
 
     fn measure(&mut self, mut parts: Parts<'_>) -> Built<ItemKind> {

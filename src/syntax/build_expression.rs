@@ -196,6 +196,11 @@ impl Builder<'_> {
         Some(ExpressionKind::Call { function, arguments })
     }
 
+    /// The components where an expression is nothing but `(a, b, ..)`.
+    pub fn tuple_of(&mut self, pair: &Pair<'_, Rule>) -> Option<Vec<Expression>> {
+        as_tuple(pair).map(|tuple| self.expressions(tuple))
+    }
+
     /// The span is that of the inside: parentheses are not part of the tree.
     fn parenthesis(&mut self, pair: Pair<'_, Rule>, depth: usize) -> Option<Expression> {
         let span = self.span(&pair);

@@ -332,7 +332,7 @@ fn description(rule: Rule) -> Option<(u8, String)> {
         Rule::arrow => (0, "`->`"),
         Rule::range_dots => (0, "`..`"),
         Rule::plus_minus => (0, "`+-`"),
-        Rule::joint_axis | Rule::open_paren => (2, "`(`"),
+        Rule::joint_axes | Rule::open_paren => (2, "`(`"),
         Rule::name | Rule::path | Rule::removed | Rule::declared_name | Rule::declared | Rule::member => (3, "a name"),
         Rule::derivative => (3, "a derivative `z'`"),
         Rule::text => (3, "a text in quotes"),
@@ -340,7 +340,9 @@ fn description(rule: Rule) -> Option<(u8, String)> {
         Rule::written_unit_inside => (3, "a unit"),
         Rule::type_expression | Rule::type_factor | Rule::type_name => (3, "a type"),
         Rule::type_one => return None,
-        Rule::axis | Rule::direction => (3, "an axis `x`, `y`, `z`"),
+        Rule::axis | Rule::direction | Rule::body_axis | Rule::joint_axis | Rule::joint_motion => {
+            (3, "an axis `x`, `y`, `z`")
+        }
         Rule::declaration | Rule::changed => (3, "a declaration (`force`, `signal`, `effect`, ...)"),
         Rule::value | Rule::range => (VALUE_RANK, "a value"),
         Rule::expression
@@ -410,6 +412,7 @@ fn keyword(rule: Rule) -> Option<&'static str> {
     Some(match rule {
         Rule::on_word | Rule::place_on => "on",
         Rule::along_word => "along",
+        Rule::about_word => "about",
         Rule::of_word => "of",
         Rule::in_word | Rule::limits => "in",
         Rule::for_word => "for",

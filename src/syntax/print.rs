@@ -56,9 +56,9 @@ fn kind(kind: &ItemKind) -> String {
             with_fields(&head, fields)
         }
         ItemKind::Body { name, fields, points } => body(name, fields, points),
-        ItemKind::Joint { name, kind, axis, parent, child, fields } => {
-            let axis = axis.as_ref().map(joint_axis).unwrap_or_default();
-            let head = format!("joint {}: {}{axis} {} -> {}", name.text, kind.text, parent.text, child.text);
+        ItemKind::Joint { name, kind, axes, parent, child, fields } => {
+            let axes = joint_axes(axes);
+            let head = format!("joint {}: {}{axes} {} -> {}", name.text, kind.text, parent.text, child.text);
             with_fields(&head, fields)
         }
         ItemKind::Element { role, name, law, place, fields } => {
@@ -172,9 +172,13 @@ fn place_text(place: &ElementPlace) -> String {
     match place {
         ElementPlace::Nowhere => String::new(),
         ElementPlace::On(name) => format!(" on {}", name.text),
-        ElementPlace::Between { first, second, along } => {
-            let along = along.as_ref().map(|along| format!(" along {}", direction_text(along))).unwrap_or_default();
-            format!(" {} -> {}{along}", first.text, second.text)
+        ElementPlace::Between { first, second, axis } => {
+            let axis = match axis {
+                None => String::new(),
+                Some((PlaceAxis::Along, direction)) => format!(" along {}", direction_text(direction)),
+                Some((PlaceAxis::About, direction)) => format!(" about {}", direction_text(direction)),
+            };
+            format!(" {} -> {}{axis}", first.text, second.text)
         }
     }
 }
@@ -188,13 +192,26 @@ fn direction_text(direction: &Direction) -> String {
     match &direction.kind {
         DirectionKind::Axis { axis, negative } => axis_text(*axis, *negative),
         DirectionKind::Vector(components) => tuple(components),
+        DirectionKind::OfBody { path, negative } => format!("{}{}", if *negative { "-" } else { "" }, path.text),
     }
 }
 
-fn joint_axis(direction: &Direction) -> String {
-    match &direction.kind {
-        DirectionKind::Axis { axis, negative } => format!("({})", axis_text(*axis, *negative)),
-        DirectionKind::Vector(components) => tuple(components),
+fn joint_axes(axes: &[JointAxis]) -> String {
+    match axes {
+        [] => String::new(),
+        [JointAxis { motion: None, direction: Direction { kind: DirectionKind::Vector(components), .. } }] => {
+            tuple(components)
+        }
+        _ => {
+            let texts: Vec<String> = axes
+                .iter()
+                .map(|axis| {
+                    let motion = axis.motion.as_ref().map(|motion| format!("{} ", motion.text)).unwrap_or_default();
+                    format!("{motion}{}", direction_text(&axis.direction))
+                })
+                .collect();
+            format!("({})", texts.join(", "))
+        }
     }
 }
 

@@ -38,7 +38,7 @@ pub enum ItemKind {
     /// `body NAME { mass = .., centre_of_gravity = (..), inertia = (..), point tip = (..) }`
     Body { name: Name, fields: Vec<Field>, points: Vec<Field> },
     /// `joint NAME: prismatic(z) PARENT -> CHILD { fields }`; attachments are bodies or points (`ground`, `arm.tip`).
-    Joint { name: Name, kind: Name, axis: Option<Direction>, parent: Name, child: Name, fields: Vec<Field> },
+    Joint { name: Name, kind: Name, axes: Vec<JointAxis>, parent: Name, child: Name, fields: Vec<Field> },
     /// `force|actuator|signal NAME: LAW [on JOINT | A -> B [along z]] { fields }`
     /// and `effect NAME: EFFECT on PLACE { fields }`.
     Element { role: ElementRole, name: Name, law: Name, place: ElementPlace, fields: Vec<Field> },
@@ -98,11 +98,25 @@ pub enum ElementPlace {
     Nowhere,
     /// `on NAME`
     On(Name),
-    /// `A -> B [along z]`
-    Between { first: Name, second: Name, along: Option<Direction> },
+    /// `A -> B [along z | about z]`
+    Between { first: Name, second: Name, axis: Option<(PlaceAxis, Direction)> },
 }
 
-/// `x`, `-z`, or `(0, 0.6, 0.8)`.
+/// One of the axes of a joint: `z`, `turn z`, `shift (0, 0.6, 0.8)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointAxis {
+    pub motion: Option<Name>,
+    pub direction: Direction,
+}
+
+/// How a force element uses its direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlaceAxis {
+    Along,
+    About,
+}
+
+/// `x`, `-z`, `(0, 0.6, 0.8)`, or `bogie.y`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Direction {
     pub kind: DirectionKind,
@@ -117,6 +131,11 @@ pub enum DirectionKind {
         negative: bool,
     },
     Vector(Vec<Expression>),
+    /// Axis of a body, which turns with it.
+    OfBody {
+        path: Name,
+        negative: bool,
+    },
 }
 
 /// `key = value` inside braces.

@@ -37,6 +37,7 @@ impl Builder {
             states: vec![],
             measures: vec![],
             point_quantities: vec![],
+            reactions: vec![],
             groups: Group { name: "total".into(), groups: vec![], channels: vec![] },
             experiments: vec![],
             manoeuvres: vec![],
@@ -109,7 +110,7 @@ impl Builder {
         Attachment { body, position: self.vector(position) }
     }
 
-    pub fn joint(&mut self, name: &str, kind: JointKind, parent: Attachment, child: Attachment) -> usize {
+    pub fn joint(&mut self, name: &str, motion: Option<AxisMotion>, parent: Attachment, child: Attachment) -> usize {
         let mut symbol = |what: &str| self.study.graph.symbol(&format!("{name}.{what}"));
         let symbols = JointSymbols {
             position: symbol("position"),
@@ -117,13 +118,32 @@ impl Builder {
             acceleration: symbol("acceleration"),
             inertia: symbol("inertia"),
         };
-        let coordinate = if matches!(kind, JointKind::Fixed) { None } else { Some(symbols) };
-        self.study.joints.push(Joint { name: name.into(), kind, parent, child, coordinate, span: Span::default() });
+        let axes = motion
+            .map(|motion| JointAxis { name: name.into(), motion, symbols, prescribed: None })
+            .into_iter()
+            .collect();
+        let kind = match motion {
+            None => JointKind::Fixed,
+            Some(AxisMotion::Shift(_)) => JointKind::Prismatic,
+            Some(AxisMotion::Turn(_)) => JointKind::Revolute,
+        };
+        self.study.joints.push(Joint {
+            name: name.into(),
+            kind,
+            parent,
+            child,
+            orientation: None,
+            axes,
+            rotation: None,
+            length: None,
+            closes_loop: false,
+            span: Span::default(),
+        });
         self.study.joints.len() - 1
     }
 
     pub fn symbols(&self, joint: usize) -> JointSymbols {
-        self.study.joints[joint].coordinate.expect("joint moves")
+        self.study.joints[joint].single_axis().expect("joint moves").symbols
     }
 
     /// A force element whose load is `law(graph, x, v)`.

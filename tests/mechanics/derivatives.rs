@@ -31,12 +31,12 @@ fn cart() -> Builder {
     b.study.bodies[cart].mass = theta[3];
     let arm = b.body("arm", 0.6, [0.0, 0.0, -0.4], [0.02, 0.03, 0.04, 0.0, 0.001, 0.0]);
     let (ground, on_cart) = (b.attach(GROUND, [0.0; 3]), b.attach(Some(cart), [0.0; 3]));
-    let slide = b.joint("slide", JointKind::Prismatic { axis: [1.0, 0.0, 0.0] }, ground, on_cart);
+    let slide = b.joint("slide", Some(AxisMotion::Shift([1.0, 0.0, 0.0])), ground, on_cart);
     let hinge_end = b.attach(Some(arm), [0.0; 3]);
-    let hinge = b.joint("hinge", JointKind::Revolute { axis: [0.0, 0.8, 0.6] }, on_cart, hinge_end);
+    let hinge = b.joint("hinge", Some(AxisMotion::Turn([0.0, 0.8, 0.6])), on_cart, hinge_end);
     let maxwell = b.state("maxwell.z");
     let t = b.study.graph.variable(b.study.time);
-    let slide_force = b.force("motor", ForcePlace::Joint(slide), |g, x, v| {
+    let slide_force = b.force("motor", ForcePlace::Joint { joint: slide, axis: 0 }, |g, x, v| {
         let late = g.subtract(t, theta[2]);
         let u = g.sample(input, 0, late);
         let error = g.subtract(u, x);
@@ -205,8 +205,8 @@ fn identified_exponent_has_a_derivative_at_zero() {
     let exponent = b.parameter("exponent", 1.7);
     let body = b.body("body", 2.0, [0.0; 3], [0.0; 6]);
     let (ground, end) = (b.attach(GROUND, [0.0; 3]), b.attach(Some(body), [0.0; 3]));
-    let slide = b.joint("slide", JointKind::Prismatic { axis: [0.0, 0.0, 1.0] }, ground, end);
-    b.force("drag", ForcePlace::Joint(slide), |g, _, v| {
+    let slide = b.joint("slide", Some(AxisMotion::Shift([0.0, 0.0, 1.0])), ground, end);
+    b.force("drag", ForcePlace::Joint { joint: slide, axis: 0 }, |g, _, v| {
         let size = g.unary(Unary::Abs, v);
         g.binary(ident::expression::Binary::Power, size, exponent)
     });

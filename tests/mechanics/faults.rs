@@ -5,8 +5,8 @@ use ident::diagnostics::{Code, Diagnostic};
 use ident::mechanics::derive;
 use ident::study::*;
 
-const Z: JointKind = JointKind::Prismatic { axis: [0.0, 0.0, 1.0] };
-const TURN: JointKind = JointKind::Revolute { axis: [0.6, 0.0, 0.8] };
+const Z: Option<AxisMotion> = Some(AxisMotion::Shift([0.0, 0.0, 1.0]));
+const TURN: Option<AxisMotion> = Some(AxisMotion::Turn([0.6, 0.0, 0.8]));
 
 fn faults(b: &Builder) -> Vec<Diagnostic> {
     derive(&b.study).expect_err("must be refused")
@@ -23,7 +23,7 @@ fn assert_only(b: &Builder, code: Code, words: &[&str]) {
 }
 
 /// `bodies` one after the other on joints of `kind`.
-fn chain(kind: JointKind, bodies: &[(f64, f64)]) -> Builder {
+fn chain(kind: Option<AxisMotion>, bodies: &[(f64, f64)]) -> Builder {
     let mut b = Builder::new();
     let mut inner = GROUND;
     for (i, &(mass, inertia)) in bodies.iter().enumerate() {
@@ -61,7 +61,7 @@ fn a_massless_end_is_named_with_its_joint() {
 fn a_massless_body_between_is_fine_across_axes_but_not_along_one() {
     let mut b = chain(Z, &[(0.0, 0.0), (1.0, 0.0)]);
     assert_only(&b, Code::NO_INERTIA, &["joint0", "body0"]);
-    b.study.joints[1].kind = JointKind::Prismatic { axis: [0.0, 0.6, 0.8] };
+    b.study.joints[1].kind = Some(AxisMotion::Shift([0.0, 0.6, 0.8]));
     let system = derive(&b.study).expect("two directions of one mass");
     assert_eq!(system.states.len(), 4);
 }
@@ -81,14 +81,14 @@ fn coincident_points_need_a_direction() {
 fn a_load_may_not_depend_on_an_acceleration() {
     let mut b = chain(Z, &[(1.0, 0.0)]);
     let acceleration = b.study.graph.variable(b.symbols(0).acceleration);
-    b.force("added_mass", ForcePlace::Joint(0), |_, _, _| acceleration);
+    b.force("added_mass", ForcePlace::Joint { joint: 0, axis: 0 }, |_, _, _| acceleration);
     assert_only(&b, Code::ACCELERATION_IN_LOAD, &["added_mass", "joint0.acceleration"]);
 }
 
 #[test]
 fn a_force_on_a_fixed_joint_is_refused() {
-    let mut b = chain(JointKind::Fixed, &[(1.0, 0.0)]);
-    b.force("push", ForcePlace::Joint(0), |_, x, _| x);
+    let mut b = chain(None, &[(1.0, 0.0)]);
+    b.force("push", ForcePlace::Joint { joint: 0, axis: 0 }, |_, x, _| x);
     assert_only(&b, Code::FORCE_ON_FIXED_JOINT, &["push", "joint0"]);
 }
 
@@ -113,8 +113,8 @@ fn a_quantity_that_nothing_defines_is_named() {
 
 #[test]
 fn all_faults_come_at_once() {
-    let mut b = chain(JointKind::Fixed, &[(1.0, 0.0)]);
-    b.force("push", ForcePlace::Joint(0), |_, x, _| x);
-    b.force("pull", ForcePlace::Joint(0), |_, x, _| x);
+    let mut b = chain(None, &[(1.0, 0.0)]);
+    b.force("push", ForcePlace::Joint { joint: 0, axis: 0 }, |_, x, _| x);
+    b.force("pull", ForcePlace::Joint { joint: 0, axis: 0 }, |_, x, _| x);
     assert_eq!(faults(&b).len(), 2);
 }

@@ -81,9 +81,9 @@ pub fn numbers(study: &Study, nodes: [Node; 3]) -> V {
 
 impl Mechanism<'_> {
     fn axis(&self, joint: &Joint) -> V {
-        match joint.kind {
-            JointKind::Fixed => [0.0; 3],
-            JointKind::Prismatic { axis } | JointKind::Revolute { axis } => axis,
+        match joint.single_axis().map(|axis| axis.motion) {
+            None => [0.0; 3],
+            Some(AxisMotion::Shift(axis)) | Some(AxisMotion::Turn(axis)) => axis,
         }
     }
 
@@ -99,8 +99,8 @@ impl Mechanism<'_> {
                 let ends = [joint.parent.body, joint.child.body].map(|body| Self::pose_of(&poses, body));
                 let [a, b] = [joint.parent, joint.child].map(|end| numbers(self.study, end.position));
                 let axis = self.axis(joint);
-                let (angle, way) = match joint.kind {
-                    JointKind::Revolute { .. } => ([self.q[k], self.v[k]], [0.0, 0.0]),
+                let (angle, way) = match joint.single_axis().map(|axis| axis.motion) {
+                    Some(AxisMotion::Turn(_)) => ([self.q[k], self.v[k]], [0.0, 0.0]),
                     _ => ([0.0, 0.0], [self.q[k], self.v[k]]),
                 };
                 let relative = turn(axis, angle[0]);
@@ -175,7 +175,7 @@ impl Mechanism<'_> {
         let zeros = vec![0.0; self.q.len()];
         let drawn = Mechanism { study: self.study, q: zeros.clone(), v: zeros }.poses();
         match &force.place {
-            ForcePlace::Joint(joint) => (self.q[*joint], self.v[*joint]),
+            ForcePlace::Joint { joint: joint, axis: 0 } => (self.q[*joint], self.v[*joint]),
             ForcePlace::Between { first, second, along, free_length } => {
                 let difference = |poses: &[Pose]| {
                     let (a, b) = (self.end(poses, first), self.end(poses, second));
@@ -257,12 +257,12 @@ impl Mechanism<'_> {
         };
         for (element, &load) in self.study.forces.iter().zip(loads) {
             match &element.place {
-                ForcePlace::Joint(k) => {
+                ForcePlace::Joint { joint: k, axis: 0 } => {
                     let joint = &self.study.joints[*k];
                     let u = self.ground_axis(joint, poses);
                     let at = self.end(poses, &joint.child).0;
-                    let (f, m) = match joint.kind {
-                        JointKind::Revolute { .. } => ([0.0; 3], mul(load, u)),
+                    let (f, m) = match joint.single_axis().map(|axis| axis.motion) {
+                        Some(AxisMotion::Turn(_)) => ([0.0; 3], mul(load, u)),
                         _ => (mul(load, u), [0.0; 3]),
                     };
                     push(joint.child.body, at, f, m);
@@ -306,16 +306,16 @@ impl Mechanism<'_> {
         }
         let w_parent = joint.parent.body.map_or([0.0; 3], |body| poses[body].w);
         let motion = mul(self.v[k], self.ground_axis(joint, poses));
-        known += match (joint.kind, is_angular) {
-            (JointKind::Revolute { .. }, true) => dot(direction, cross(w_parent, motion)),
-            (JointKind::Prismatic { .. }, false) => 2.0 * dot(direction, cross(w_parent, motion)),
+        known += match (joint.single_axis().map(|axis| axis.motion), is_angular) {
+            (Some(AxisMotion::Turn(_)), true) => dot(direction, cross(w_parent, motion)),
+            (Some(AxisMotion::Shift(_)), false) => 2.0 * dot(direction, cross(w_parent, motion)),
             _ => 0.0,
         };
         (row, known)
     }
 
     fn along(&self, k: usize, joint: &Joint, poses: &[Pose]) -> (Vec<f64>, f64) {
-        let is_angular = matches!(joint.kind, JointKind::Revolute { .. });
+        let is_angular = matches!(joint.single_axis().map(|axis| axis.motion), Some(AxisMotion::Turn(_)));
         self.relative(k, joint, poses, self.ground_axis(joint, poses), is_angular)
     }
 
@@ -324,10 +324,10 @@ impl Mechanism<'_> {
         let u = self.ground_axis(joint, poses);
         let helper = if u[0].abs() < 0.7 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
         let across = vec![cross(u, helper), cross(u, cross(u, helper))];
-        let (linear, angular) = match joint.kind {
-            JointKind::Fixed => (all.clone(), all),
-            JointKind::Prismatic { .. } => (across, all),
-            JointKind::Revolute { .. } => (all, across),
+        let (linear, angular) = match joint.single_axis().map(|axis| axis.motion) {
+            None => (all.clone(), all),
+            Some(AxisMotion::Shift(_)) => (across, all),
+            Some(AxisMotion::Turn(_)) => (all, across),
         };
         let rows = linear.into_iter().map(|d| self.relative(k, joint, poses, d, false));
         rows.chain(angular.into_iter().map(|d| self.relative(k, joint, poses, d, true))).collect()

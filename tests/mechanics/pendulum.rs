@@ -3,7 +3,7 @@
 use crate::build::{Builder, GROUND, NoInputs, Random, assert_close};
 use ident::integrate::Dynamics;
 use ident::mechanics::derive;
-use ident::study::JointKind;
+use ident::study::AxisMotion;
 use ident::tape::{Bound, Model};
 
 type Rotation = [[f64; 3]; 3];
@@ -54,7 +54,7 @@ fn chain(r: Rotation, arms: &[Arm]) -> Builder {
         let inertia = std::array::from_fn(|k| if k < 3 { arm.inertia } else { 0.0 });
         let body = b.body(&format!("arm{i}"), arm.mass, place(-arm.centre), inertia);
         let child = b.attach(Some(body), place(0.0));
-        b.joint(&format!("hinge{i}"), JointKind::Revolute { axis }, parent, child);
+        b.joint(&format!("hinge{i}"), Some(AxisMotion::Turn(axis)), parent, child);
         parent = b.attach(Some(body), place(-arm.length));
     }
     b

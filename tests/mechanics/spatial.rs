@@ -39,16 +39,16 @@ fn random_tree(random: &mut Random, kinds: &[usize], damping: f64) -> Builder {
         };
         let axis = random.unit();
         let kind = match kind {
-            0 => JointKind::Fixed,
-            1 => JointKind::Prismatic { axis },
-            _ => JointKind::Revolute { axis },
+            0 => None,
+            1 => Some(AxisMotion::Shift(axis)),
+            _ => Some(AxisMotion::Turn(axis)),
         };
         let near = b.attach(inner, random.vector());
         let far = b.attach(Some(body), random.vector());
         let (parent, child) = if random.next() < 0.0 { (near, far) } else { (far, near) };
         let joint = b.joint(&format!("joint{i}"), kind, parent, child);
-        if !matches!(kind, JointKind::Fixed) && random.next() > 0.0 {
-            spring(&mut b, &format!("in_joint{i}"), ForcePlace::Joint(joint), damping);
+        if !matches!(kind, None) && random.next() > 0.0 {
+            spring(&mut b, &format!("in_joint{i}"), ForcePlace::Joint { joint: joint, axis: 0 }, damping);
         }
         let point = b.attach(Some(body), random.vector());
         for motion in [PointMotion::Position, PointMotion::Velocity, PointMotion::Acceleration] {
@@ -74,7 +74,7 @@ fn mechanism<'a>(study: &'a Study, y: &[f64]) -> Mechanism<'a> {
         .joints
         .iter()
         .map(|joint| {
-            if joint.coordinate.is_none() {
+            if joint.axes.is_empty() {
                 return (0.0, 0.0);
             }
             moving += 1;
@@ -110,7 +110,7 @@ fn random_trees_accelerate_as_newton_and_euler_say() {
             assert!(bound.explicit_rates(0.0, &y, &mut rates));
             let reference = mechanism(&b.study, &y);
             let (expected, origins) = reference.accelerations(&loads(&reference, DAMPING));
-            let moving = b.study.joints.iter().zip(expected).filter(|(joint, _)| joint.coordinate.is_some());
+            let moving = b.study.joints.iter().zip(expected).filter(|(joint, _)| !joint.axes.is_empty());
             let expected: Vec<f64> = moving.map(|(_, a)| a).collect();
             assert_close(&rates[n / 2..], &expected, 1e-9);
 
@@ -194,11 +194,11 @@ fn joint_inertia_is_what_moves_rigidly_with_the_joint() {
     let place = |b: &mut Builder, body| b.attach(body, [0.0; 3]);
     let ends =
         [place(&mut b, GROUND), place(&mut b, Some(carriage)), place(&mut b, Some(load)), place(&mut b, Some(wheel))];
-    let slide = b.joint("slide", JointKind::Prismatic { axis: [1.0, 0.0, 0.0] }, ends[0], ends[1]);
-    b.joint("weld", JointKind::Fixed, ends[1], ends[2]);
-    let hub = b.joint("hub", JointKind::Revolute { axis: [0.0, 0.0, 1.0] }, ends[2], ends[3]);
+    let slide = b.joint("slide", Some(AxisMotion::Shift([1.0, 0.0, 0.0])), ends[0], ends[1]);
+    b.joint("weld", None, ends[1], ends[2]);
+    let hub = b.joint("hub", Some(AxisMotion::Turn([0.0, 0.0, 1.0])), ends[2], ends[3]);
     for joint in [slide, hub] {
-        let node = b.study.graph.variable(b.study.joints[joint].coordinate.unwrap().inertia);
+        let node = b.study.graph.variable(b.study.joints[joint].axes[0].symbols.inertia);
         b.measure("inertia", node);
     }
     let model = Model::compile(&derive(&b.study).expect("derivable"));

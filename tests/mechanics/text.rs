@@ -12,7 +12,7 @@ fn quarter_vehicle() -> Study {
     b.study.name = "quarter_vehicle".into();
     let [c, d] = [("c_strut", 22e3), ("d_strut", 1.2e3)].map(|(name, start)| b.parameter(name, start));
     let u = b.input("u");
-    let z = JointKind::Prismatic { axis: [0.0, 0.0, 1.0] };
+    let z = Some(AxisMotion::Shift([0.0, 0.0, 1.0]));
     let ground = b.attach(GROUND, [0.0; 3]);
     let mut ends = Vec::new();
     for (name, mass, height) in [("wheel", 45.0, 0.3), ("chassis", 320.0, 0.8)] {
@@ -62,10 +62,10 @@ fn crane() -> Study {
     let [ground, on_trolley, top] = [GROUND, Some(trolley), Some(arm)].map(|body| b.attach(body, [0.0; 3]));
     let tip = b.attach(Some(arm), [0.0, 0.0, -1.0]);
     let [eye, tail_end] = [Some(hook), Some(tail)].map(|body| b.attach(body, [0.0; 3]));
-    b.joint("rail", JointKind::Prismatic { axis: [1.0, 0.0, 0.0] }, ground, on_trolley);
-    b.joint("pivot", JointKind::Revolute { axis: [0.0, 1.0, 0.0] }, on_trolley, top);
-    b.joint("weld", JointKind::Fixed, tip, eye);
-    b.joint("tail_joint", JointKind::Revolute { axis: [0.0, 1.0, 0.0] }, tail_end, eye);
+    b.joint("rail", Some(AxisMotion::Shift([1.0, 0.0, 0.0])), ground, on_trolley);
+    b.joint("pivot", Some(AxisMotion::Turn([0.0, 1.0, 0.0])), on_trolley, top);
+    b.joint("weld", None, tip, eye);
+    b.joint("tail_joint", Some(AxisMotion::Turn([0.0, 1.0, 0.0])), tail_end, eye);
     b.measure_point("hook", eye, PointMotion::Position);
     b.study
 }

@@ -144,7 +144,7 @@ fn effects_compose_in_order_of_declaration() {
     let linear: f64 = -110.0 * 0.4;
     close(load(&study, "s", &values), linear / (1.0 + (0.01 * linear) * (0.01 * linear)).sqrt());
     close(load(&study, "rub", &values), -3.0 * 2.0f64.tanh());
-    assert!(matches!(force(&study, "rub").place, ForcePlace::Joint(0)));
+    assert!(matches!(force(&study, "rub").place, ForcePlace::Joint { joint: 0, axis: 0 }));
     assert!(study.places.iter().all(|place| place.name != "rub"), "effects are no places for effects");
     let sums = study.places.iter().find(|place| place.name == "guide").expect("the joint");
     let total = sums.probes.iter().find(|(quantity, _)| *quantity == PlaceQuantity::Load).expect("its load").1;
@@ -253,8 +253,8 @@ fn elements_between_bodies_on_parallel_guides_act_along_them() {
          identify { L in 0.1 .. 1 m from 0.5 m }",
     );
     let along = |name: &str| match force(&study, name).place {
-        ForcePlace::Between { along, free_length, .. } => (along, free_length),
-        ForcePlace::Joint(_) => panic!("stands on a joint"),
+        ForcePlace::Between { along, free_length, .. } => (along.map(|along| along.axis), free_length),
+        ForcePlace::Joint { .. } => panic!("stands on a joint"),
     };
     assert_eq!(along("along_guides"), (Some([0.0, 0.0, -1.0]), None));
     let (axis, length) = along("free");
@@ -274,7 +274,7 @@ fn joints_come_out_parents_first_and_points_are_quantities() {
     );
     let names: Vec<&str> = study.joints.iter().map(|joint| joint.name.as_str()).collect();
     assert_eq!(names, ["pivot", "head"]);
-    assert!(matches!(force(&study, "f").place, ForcePlace::Joint(1)));
+    assert!(matches!(force(&study, "f").place, ForcePlace::Joint { joint: 1, axis: 0 }));
     assert_eq!(study.point_quantities.len(), 2);
     let quantity = &study.point_quantities[0];
     assert_eq!((quantity.motion, quantity.axis), (PointMotion::Velocity, 0));
