@@ -146,7 +146,7 @@ fn start(
     let t0 = record.start_time();
     let given = bound.start_values(record.experiment, t0);
     let (mut y, mut sensitivity) = (given.values, given.derivatives);
-    if given.equilibrium.contains(&true) {
+    if given.equilibrium[..compiled.model.state_count()].contains(&true) {
         let balanced = integrate::equilibrium(bound, t0, &y, &sensitivity, &given.equilibrium)?;
         y = balanced.y;
         sensitivity = balanced.sensitivity;

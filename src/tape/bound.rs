@@ -20,7 +20,7 @@ pub struct Bound<'a> {
 /// Start values as far as they are given; see [`Bound::start_values`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartValues {
-    /// Length n; zero where equilibrium (or consistency) determines the value.
+    /// Length n; that of the reference configuration where equilibrium (or consistency) determines the value.
     pub values: Vec<f64>,
     /// d(values)/d(parameters), n x p column-major.
     pub derivatives: Vec<f64>,
@@ -130,7 +130,8 @@ impl<'a> Bound<'a> {
     /// answered as equilibrium throughout.
     pub fn start_values(&mut self, experiment: usize, t0: f64) -> StartValues {
         let (n, p) = (self.model.dimension(), self.model.parameter_count());
-        let mut start = StartValues { values: vec![0.0; n], derivatives: vec![0.0; n * p], equilibrium: vec![true; n] };
+        let values = self.model.variables.iter().map(|variable| variable.reference).collect();
+        let mut start = StartValues { values, derivatives: vec![0.0; n * p], equilibrium: vec![true; n] };
         let Some(program) = self.model.starts.get(experiment) else { return start };
         self.is_current = false;
         self.registers[self.model.layout.time] = t0;

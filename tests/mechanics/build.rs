@@ -15,6 +15,11 @@ fn unit() -> Unit {
     Unit { symbol: String::new(), dimension: Dimension::default(), factor: 1.0, offset: 0.0 }
 }
 
+/// A direction fixed in space.
+pub fn along(axis: [f64; 3]) -> Option<ForceDirection> {
+    Some(ForceDirection { axis, body: None, motion: Motion::Translational })
+}
+
 impl Builder {
     pub fn new() -> Self {
         let mut graph = Graph::new();

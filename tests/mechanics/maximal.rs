@@ -175,7 +175,7 @@ impl Mechanism<'_> {
         let zeros = vec![0.0; self.q.len()];
         let drawn = Mechanism { study: self.study, q: zeros.clone(), v: zeros }.poses();
         match &force.place {
-            ForcePlace::Joint { joint: joint, axis: 0 } => (self.q[*joint], self.v[*joint]),
+            ForcePlace::Joint { joint, .. } => (self.q[*joint], self.v[*joint]),
             ForcePlace::Between { first, second, along, free_length } => {
                 let difference = |poses: &[Pose]| {
                     let (a, b) = (self.end(poses, first), self.end(poses, second));
@@ -184,7 +184,7 @@ impl Mechanism<'_> {
                 let (now, rate) = difference(&poses);
                 let (before, _) = difference(&drawn);
                 match along {
-                    Some(axis) => (dot(*axis, sub(now, before)), dot(*axis, rate)),
+                    Some(along) => (dot(along.axis, sub(now, before)), dot(along.axis, rate)),
                     None => {
                         let length = dot(now, now).sqrt();
                         let free = free_length.map_or(dot(before, before).sqrt(), |node| value(self.study, node));
@@ -257,7 +257,7 @@ impl Mechanism<'_> {
         };
         for (element, &load) in self.study.forces.iter().zip(loads) {
             match &element.place {
-                ForcePlace::Joint { joint: k, axis: 0 } => {
+                ForcePlace::Joint { joint: k, .. } => {
                     let joint = &self.study.joints[*k];
                     let u = self.ground_axis(joint, poses);
                     let at = self.end(poses, &joint.child).0;
@@ -271,7 +271,7 @@ impl Mechanism<'_> {
                 ForcePlace::Between { first, second, along, .. } => {
                     let (a, b) = (self.end(poses, first).0, self.end(poses, second).0);
                     let line = sub(b, a);
-                    let direction = along.unwrap_or(mul(1.0 / dot(line, line).sqrt(), line));
+                    let direction = along.map_or(mul(1.0 / dot(line, line).sqrt(), line), |along| along.axis);
                     push(second.body, b, mul(load, direction), [0.0; 3]);
                     push(first.body, a, mul(-load, direction), [0.0; 3]);
                 }

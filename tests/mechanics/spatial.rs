@@ -1,6 +1,6 @@
 //! Random spatial trees of bodies against constrained Newton-Euler equations, finite differences and energy.
 
-use crate::build::{Builder, GROUND, NoInputs, Random, assert_close};
+use crate::build::{Builder, GROUND, NoInputs, Random, along, assert_close};
 use crate::maximal::{Mechanism, V};
 use ident::integrate::Dynamics;
 use ident::mechanics::derive;
@@ -57,7 +57,7 @@ fn random_tree(random: &mut Random, kinds: &[usize], damping: f64) -> Builder {
     }
     let n = kinds.len();
     for k in 0..n {
-        let along = (k % 2 == 1).then(|| random.unit());
+        let along = if k % 2 == 1 { along(random.unit()) } else { None };
         let free_length = (k % 4 == 0).then(|| b.number(0.8));
         let other = if k == 0 { GROUND } else { Some((k + n / 2) % n) };
         let (first, second) = (b.attach(other, random.vector()), b.attach(Some(k), random.vector()));

@@ -1,6 +1,6 @@
 //! Snapshots of the emitted text.
 
-use crate::build::{Builder, GROUND};
+use crate::build::{Builder, GROUND, along};
 use ident::expression::Unary;
 use ident::mechanics::{derive, emit_equations, emit_model, emit_tree};
 use ident::study::*;
@@ -22,7 +22,7 @@ fn quarter_vehicle() -> Study {
         b.joint(&format!("{name}_guide"), z, place, end);
         ends.push(end);
     }
-    let along = Some([0.0, 0.0, 1.0]);
+    let along = along([0.0, 0.0, 1.0]);
     let t = b.study.graph.variable(b.study.time);
     let tyre = ForcePlace::Between { first: ground, second: ends[0], along, free_length: None };
     b.force("tyre", tyre, |g, x, _| {
