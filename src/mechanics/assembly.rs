@@ -240,18 +240,19 @@ fn not_closed(study: &Study, rows: &[Row], residual: &[f64]) -> Diagnostic {
 }
 
 fn cannot_move(study: &Study, rows: &[Row]) -> Diagnostic {
-    let mut diagnostic = Diagnostic::error(Code::CANNOT_MOVE, "the mechanism cannot move");
+    let mut names: Vec<String> = rows.iter().map(|row| format!("`{}`", study.joints[row.joint].name)).collect();
+    names.dedup();
+    let message = format!("the mechanism cannot move: {} take away all its freedom", names.join(", "));
+    let mut diagnostic = Diagnostic::error(Code::CANNOT_MOVE, message);
     let mut seen = Vec::new();
     for row in rows {
         if !seen.contains(&row.joint) {
             seen.push(row.joint);
             let joint = &study.joints[row.joint];
-            diagnostic = diagnostic.label(joint.span, format!("closes a loop: `{}`", joint.name));
+            diagnostic = diagnostic.label(joint.span, "closes a loop");
         }
     }
-    diagnostic
-        .note("the constraints of the closed loops take away every freedom that the joints give")
-        .help("remove a joint, replace it by one with more freedom, or prescribe a motion")
+    diagnostic.help("remove a joint, replace it by one with more freedom, or prescribe a motion")
 }
 
 /// One warning per joint with redundant constraints, with the joint that would do without them.

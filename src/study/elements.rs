@@ -142,6 +142,8 @@ impl<'a> Checker<'a> {
         };
         let axis = path.text.rsplit_once('.').and_then(|(body, letter)| {
             let index = ["x", "y", "z"].iter().position(|axis| *axis == letter)?;
+            // A port may stand for a point of the body.
+            let (body, _) = self.split_path(body);
             let body = self.declared.bodies.iter().position(|declared| declared.name.text == body)?;
             Some((body, index))
         });

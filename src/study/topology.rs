@@ -1,6 +1,7 @@
 //! Bodies and joints: which joints carry the bodies, which close loops.
 
 use super::checker::{Allowed, Checker, Scope};
+use super::fields::find;
 use super::joints::JointFreedom;
 use super::model::{AxisMotion, JointKind};
 use crate::diagnostics::{Code, Diagnostic, similar_name};
@@ -179,7 +180,7 @@ impl<'a> Checker<'a> {
         Some(End { body, point })
     }
 
-    /// Joints that carry elements come first, then those with the least freedom, so that loops are closed where the fewest
+    /// Joints with prescribed motion come first, then those that carry elements, then those with the least freedom, so that loops are closed where the fewest
     /// constraints arise; among equals the ones declared first.
     fn choose_tree(&mut self) {
         let ground = self.declared.bodies.len();
@@ -196,7 +197,10 @@ impl<'a> Checker<'a> {
             .filter(|joint| self.topology.joint(*joint).is_some_and(|read| read.freedom.kind != JointKind::Distance))
             .collect();
         candidates.sort_by_key(|joint| {
-            self.topology.joint(*joint).map(|read| (!carries_elements(read), read.freedom.degrees_of_freedom()))
+            self.topology.joint(*joint).map(|read| {
+                let is_driven = find(self.declared.joints[*joint].fields, "motion").is_some();
+                (!is_driven, !carries_elements(read), read.freedom.degrees_of_freedom())
+            })
         });
         let mut closes_loop: Vec<bool> = self.topology.joints.iter().map(Option::is_some).collect();
         let mut group: Vec<usize> = (0..=ground).collect();

@@ -44,8 +44,8 @@ fn a_body_without_joint_is_unconnected() {
 
 #[test]
 fn a_loop_that_leaves_no_freedom_cannot_move() {
-    let mut b = chain(TURN, &[(1.0, 1.0), (1.0, 1.0)]);
-    let (near, far) = (b.attach(GROUND, [0.0, 1.0, 0.0]), b.attach(Some(1), [0.0, 1.0, 0.0]));
+    let mut b = chain(TURN, &[(1.0, 1.0)]);
+    let (near, far) = (b.attach(GROUND, [0.1, 1.2, 0.3]), b.attach(Some(0), [0.0, 1.0, 0.0]));
     let closing = b.joint("closing", TURN, near, far);
     b.study.joints[closing].closes_loop = true;
     assert_only(&b, Code::CANNOT_MOVE, &["closing"]);

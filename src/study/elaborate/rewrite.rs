@@ -38,9 +38,9 @@ impl Elaborator<'_, '_> {
                 let path = name.text.clone();
                 self.fields(points, &path, scope);
             }
-            ItemKind::Joint { name, axis, parent, child, fields, .. } => {
+            ItemKind::Joint { name, axes, parent, child, fields, .. } => {
                 self.named_fields(name, fields, scope);
-                axis.iter_mut().for_each(|axis| self.direction(axis, scope));
+                axes.iter_mut().for_each(|axis| self.direction(&mut axis.direction, scope));
                 self.reference(parent, scope);
                 self.reference(child, scope);
             }
@@ -172,11 +172,13 @@ impl Elaborator<'_, '_> {
 
     /// Directions are plain numbers.
     fn direction(&mut self, direction: &mut Direction, scope: &Scope) {
-        if let DirectionKind::Vector(components) = &mut direction.kind {
-            components.iter_mut().for_each(|component| {
+        match &mut direction.kind {
+            DirectionKind::Axis { .. } => {}
+            DirectionKind::OfBody { path, .. } => self.reference(path, scope),
+            DirectionKind::Vector(components) => components.iter_mut().for_each(|component| {
                 self.expression(component, None, scope);
                 self.numbers_for_constants(component, scope);
-            });
+            }),
         }
     }
 
@@ -208,10 +210,10 @@ impl Elaborator<'_, '_> {
         match place {
             ElementPlace::Nowhere => {}
             ElementPlace::On(name) => self.reference(name, scope),
-            ElementPlace::Between { first, second, along } => {
+            ElementPlace::Between { first, second, axis } => {
                 self.reference(first, scope);
                 self.reference(second, scope);
-                along.iter_mut().for_each(|along| self.direction(along, scope));
+                axis.iter_mut().for_each(|(_, direction)| self.direction(direction, scope));
             }
         }
     }
