@@ -6,7 +6,7 @@ use super::loops;
 use super::topology::{Coordinate, Seat, Tree};
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::vector::{self, Matrix, Vector};
-use crate::expression::{Binary, Graph, Node};
+use crate::expression::{Binary, Graph, Node, Unary};
 use crate::study::{Force, ForceDirection, ForcePlace, Motion, Study};
 
 /// Geometry of one force element.
@@ -195,13 +195,14 @@ fn between_points(
     let [first, second] = ends.map(|end| kinematics::point_reference(graph, frames, end));
     let drawn = vector::subtract(graph, second, first);
     let drawn_length = vector::norm(graph, drawn);
-    if graph.is_zero(drawn_length) {
+    let is_drawn_together = graph.is_zero(drawn_length);
+    if is_drawn_together && free_length.is_none() {
         let message = format!("the end points of force `{}` coincide in the reference configuration", force.name);
         return Err(Diagnostic::error(Code::COINCIDENT_POINTS, message)
             .label(force.span, "no direction to act along")
-            .help("name a direction with `along`, or attach it to points that are apart"));
+            .help("name a direction with `along`, give its `free_length`, or attach it to points that are apart"));
     }
-    let length = vector::norm(graph, relative);
+    let length = if is_drawn_together { rounded_length(graph, relative) } else { vector::norm(graph, relative) };
     let one = graph.constant(1.0);
     let inverse = graph.divide(one, length);
     let direction = vector::scale(graph, inverse, relative);
@@ -209,6 +210,17 @@ fn between_points(
     let rate = relative_rate(graph, frames, ends, direction);
     let effect = pulling(graph, frames, ends, direction);
     Ok(ForceGeometry { coordinate, rate, effect })
+}
+
+/// Distances below this, m, count as none: there an element without direction pulls nowhere.
+const POINT_SIZE: f64 = 1e-9;
+
+/// The length of a vector, rounded off at zero so that direction and derivatives stay finite.
+fn rounded_length(graph: &mut Graph, vector: Vector) -> Node {
+    let square = vector::dot(graph, vector, vector);
+    let size = graph.constant(POINT_SIZE * POINT_SIZE);
+    let square = graph.add(square, size);
+    graph.unary(Unary::Sqrt, square)
 }
 
 fn relative_rate(graph: &mut Graph, frames: &[FrameMotion], ends: [Seat; 2], direction: Vector) -> Node {
