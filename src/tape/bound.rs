@@ -2,6 +2,7 @@
 
 use super::InputSource;
 use super::model::{Element, Model};
+use super::sweep::Scratch;
 use crate::integrate::Dynamics;
 use crate::linear::SparsityPattern;
 
@@ -15,6 +16,7 @@ pub struct Bound<'a> {
     /// Whether the registers hold the rates at the time and variables that stand in them.
     is_current: bool,
     parameter_scale: Vec<f64>,
+    scratch: Scratch,
 }
 
 /// Start values as far as they are given; see [`Bound::start_values`].
@@ -31,8 +33,14 @@ pub struct StartValues {
 impl<'a> Bound<'a> {
     /// `theta`: parameter values (SI) in the order of [`Model::parameter_names`]; missing ones are NaN.
     pub fn new(model: &'a Model, inputs: &'a dyn InputSource, theta: &[f64]) -> Self {
-        let mut bound =
-            Self { model, inputs, registers: model.registers.clone(), is_current: false, parameter_scale: Vec::new() };
+        let mut bound = Self {
+            model,
+            inputs,
+            registers: model.registers.clone(),
+            is_current: false,
+            parameter_scale: Vec::new(),
+            scratch: Scratch::default(),
+        };
         bound.set_parameters(theta);
         bound
     }
@@ -116,7 +124,10 @@ impl<'a> Bound<'a> {
     fn evaluate_output_derivatives(&mut self, t: f64, y: &[f64]) {
         self.update(t, y);
         self.model.outputs.execute(&mut self.registers, self.inputs);
-        self.model.output_by_state.program.execute(&mut self.registers, self.inputs);
+        self.model.output_by_state.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
+        if self.model.output_by_parameter.sweep.is_some() {
+            self.model.output_by_parameter.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
+        }
     }
 
     /// The probes of the system, in its order.
@@ -206,7 +217,7 @@ impl Dynamics for Bound<'_> {
 
     fn jacobian(&mut self, t: f64, y: &[f64], _y_prime: &[f64], c: f64, values: &mut [f64]) {
         self.update(t, y);
-        self.model.jacobian.program.execute(&mut self.registers, self.inputs);
+        self.model.jacobian.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
         values.fill(0.0);
         self.scatter_residual(&self.model.jacobian.elements, values);
         for &slot in &self.model.diagonal {
@@ -216,7 +227,7 @@ impl Dynamics for Bound<'_> {
 
     fn parameter_derivative(&mut self, t: f64, y: &[f64], _y_prime: &[f64], values: &mut [f64]) {
         self.update(t, y);
-        self.model.parameter_derivative.program.execute(&mut self.registers, self.inputs);
+        self.model.parameter_derivative.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
         values.fill(0.0);
         self.scatter_residual(&self.model.parameter_derivative.elements, values);
     }

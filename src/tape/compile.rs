@@ -1,7 +1,8 @@
 //! From equations to programs.
 
-use super::model::{Derivative, Element, Layout, Model, StartProgram};
+use super::model::{Derivative, DerivativeForm, Element, Layout, Model, StartProgram};
 use super::program::{Instruction, Program};
+use super::sweep::Sweep;
 use crate::expression::{Binary, Entry, Graph, Node, Operation, Symbol};
 use crate::linear::SparsityPattern;
 use crate::mechanics::{StartEquation, System, Variable};
@@ -11,14 +12,28 @@ use std::collections::HashMap;
 impl Model {
     /// Compiles a system. Symbols that are neither time, variable nor parameter evaluate to NaN.
     pub fn compile(system: &System) -> Model {
+        Self::compile_with(system, DerivativeForm::Automatic)
+    }
+
+    /// As [`Model::compile`] with derivatives in the form asked for.
+    pub fn compile_with(system: &System, form: DerivativeForm) -> Model {
         let variables: Vec<Variable> = system.states.iter().chain(&system.algebraic).cloned().collect();
         let (n, state_count, p) = (variables.len(), system.states.len(), system.parameters.len());
         let mut roots = Roots::of(system);
         let unknowns: Vec<Symbol> = variables.iter().map(|variable| variable.symbol).collect();
-        let jacobian = roots.graph.jacobian(&roots.rates, &unknowns);
-        let parameter_derivative = roots.graph.jacobian(&roots.rates, &system.parameters);
-        let output_by_state = roots.graph.jacobian(&roots.outputs, &unknowns);
-        let output_by_parameter = roots.graph.jacobian(&roots.outputs, &system.parameters);
+        let size = roots.graph.reachable(&[&roots.rates[..], &roots.outputs].concat()).len();
+        let by_sweep = match form {
+            DerivativeForm::Automatic => size * (n + p) > SYMBOLIC_LIMIT,
+            DerivativeForm::Symbolic => false,
+            DerivativeForm::Swept => true,
+        };
+        let mut symbolic = |of: &[Node], by: &[Symbol]| {
+            if by_sweep { Vec::new() } else { roots.graph.jacobian(of, by) }
+        };
+        let jacobian = symbolic(&roots.rates, &unknowns);
+        let parameter_derivative = symbolic(&roots.rates, &system.parameters);
+        let output_by_state = symbolic(&roots.outputs, &unknowns);
+        let output_by_parameter = symbolic(&roots.outputs, &system.parameters);
         let start_derivatives: Vec<Vec<Entry>> =
             roots.starts.iter().map(|values| roots.graph.jacobian(values, &system.parameters)).collect();
 
@@ -38,23 +53,43 @@ impl Model {
         let rate_registers = assembler.registers_of(&roots.rates);
         let after_rates = assembler.registers.clone();
 
-        let jacobian_program = assembler.program(&nodes_of(&jacobian), Dependence::State);
-        let (pattern, diagonal) = iteration_pattern(n, state_count, &jacobian);
-        let in_pattern = |entry: &Entry| slot_in(&pattern, entry.row, entry.column);
-        let jacobian = assembler.derivative(jacobian_program, &jacobian, in_pattern);
+        let variable_columns: Vec<u32> = (0..n).map(|i| (assembler.layout.variables + i) as u32).collect();
+        let parameter_columns: Vec<u32> = (0..p).map(|i| (assembler.layout.parameters + i) as u32).collect();
+        let rate_programs = [&prologue, &forcing, &rates];
+        let mut jacobian = if by_sweep {
+            assembler.swept(&rate_programs, &variable_columns, &rate_registers)
+        } else {
+            let program = assembler.program(&nodes_of(&jacobian), Dependence::State);
+            assembler.derivative(program, &jacobian)
+        };
+        let (pattern, diagonal) = iteration_pattern(n, state_count, &jacobian.elements);
+        jacobian.place(|row, column| slot_in(&pattern, row, column));
 
         assembler.registers.clone_from(&after_rates);
-        let program = assembler.program(&nodes_of(&parameter_derivative), Dependence::State);
-        let dense = |rows: usize| move |entry: &Entry| entry.column * rows + entry.row;
-        let parameter_derivative = assembler.derivative(program, &parameter_derivative, dense(n));
+        let mut parameter_derivative = if by_sweep {
+            assembler.swept(&rate_programs, &parameter_columns, &rate_registers)
+        } else {
+            let program = assembler.program(&nodes_of(&parameter_derivative), Dependence::State);
+            assembler.derivative(program, &parameter_derivative)
+        };
+        let dense = |rows: usize| move |row: usize, column: usize| column * rows + row;
+        parameter_derivative.place(dense(n));
 
         assembler.registers.clone_from(&after_rates);
         let outputs = assembler.program(&roots.outputs, Dependence::State);
         let output_registers = assembler.registers_of(&roots.outputs);
         let m = roots.outputs.len();
-        let program = assembler.program(&output_derivatives, Dependence::State);
-        let output_by_state = assembler.derivative(program, &output_by_state, dense(m));
-        let output_by_parameter = assembler.derivative(Program::default(), &output_by_parameter, dense(m));
+        let output_programs = [&prologue, &forcing, &rates, &outputs];
+        let (mut output_by_state, mut output_by_parameter) = if by_sweep {
+            let by_state = assembler.swept(&output_programs, &variable_columns, &output_registers);
+            (by_state, assembler.swept(&output_programs, &parameter_columns, &output_registers))
+        } else {
+            let program = assembler.program(&output_derivatives, Dependence::State);
+            let by_state = assembler.derivative(program, &output_by_state);
+            (by_state, assembler.derivative(Program::default(), &output_by_parameter))
+        };
+        output_by_state.place(dense(m));
+        output_by_parameter.place(dense(m));
 
         assembler.registers.clone_from(&after_rates);
         let probes = assembler.program(&roots.probes, Dependence::State);
@@ -173,6 +208,10 @@ enum Dependence {
     Time,
     State,
 }
+
+/// Symbolic derivatives grow with the number of columns times the length of the program; from this product on, derivatives are
+/// swept through the linearised program instead: slower to evaluate, but compiled in an instant.
+const SYMBOLIC_LIMIT: usize = 400_000;
 
 const UNASSIGNED: u32 = u32::MAX;
 
@@ -310,17 +349,24 @@ impl<'a> Assembler<'a> {
         order
     }
 
-    fn derivative(&self, program: Program, entries: &[Entry], slot: impl Fn(&Entry) -> usize) -> Derivative {
+    fn derivative(&self, program: Program, entries: &[Entry]) -> Derivative {
         let elements = entries
             .iter()
             .map(|entry| Element {
                 row: entry.row as u32,
                 column: entry.column as u32,
                 register: self.registers[entry.value.index()],
-                slot: slot(entry) as u32,
+                slot: 0,
             })
             .collect();
-        Derivative { program, elements }
+        Derivative { program, sweep: None, elements }
+    }
+
+    /// d(`rows`)/d(`columns`) through programs already assembled.
+    fn swept(&mut self, programs: &[&Program], columns: &[u32], rows: &[u32]) -> Derivative {
+        let count = self.next;
+        let (sweep, elements) = Sweep::new(programs, count, columns, rows, &mut self.next);
+        Derivative { program: Program::default(), sweep: Some(sweep), elements }
     }
 
     fn start(
@@ -346,8 +392,8 @@ impl<'a> Assembler<'a> {
         }
         let in_states: Vec<Entry> =
             entries.iter().map(|entry| Entry { row: state_of_value[entry.row], ..*entry }).collect();
-        let derivative =
-            self.derivative(Program::default(), &in_states, |entry| entry.column * state_count + entry.row);
+        let mut derivative = self.derivative(Program::default(), &in_states);
+        derivative.place(|row, column| column * state_count + row);
         StartProgram { program, values: registers, elements: derivative.elements }
     }
 }
@@ -368,8 +414,9 @@ fn instruction(operation: Operation) -> Option<Instruction> {
 }
 
 /// Pattern of the iteration matrix and the slots of the differential variables' diagonal.
-fn iteration_pattern(n: usize, state_count: usize, jacobian: &[Entry]) -> (SparsityPattern, Vec<u32>) {
-    let mut places: Vec<(usize, usize)> = jacobian.iter().map(|entry| (entry.row, entry.column)).collect();
+fn iteration_pattern(n: usize, state_count: usize, jacobian: &[Element]) -> (SparsityPattern, Vec<u32>) {
+    let mut places: Vec<(usize, usize)> =
+        jacobian.iter().map(|entry| (entry.row as usize, entry.column as usize)).collect();
     places.extend((0..state_count).map(|i| (i, i)));
     let pattern = SparsityPattern::from_entries(n, n, &places);
     let diagonal = (0..state_count).map(|i| slot_in(&pattern, i, i) as u32).collect();

@@ -83,7 +83,12 @@ fn instruction_text(instruction: Instruction, operands: &[String]) -> String {
 }
 
 fn matrix(text: &mut String, title: &str, derivative: &Derivative, names: [&[String]; 2], registers: &RegisterNames) {
-    section(text, title, &derivative.program, registers);
+    match &derivative.sweep {
+        Some(sweep) => {
+            let _ = writeln!(text, "\n{title}: swept through the programs above, {} multiplications", sweep.work());
+        }
+        None => section(text, title, &derivative.program, registers),
+    }
     for element in &derivative.elements {
         let (row, column) = (&names[0][element.row as usize], &names[1][element.column as usize]);
         let _ = writeln!(text, "  [{row}, {column}] = {}", registers.name(element.register));

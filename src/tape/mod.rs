@@ -12,10 +12,11 @@ mod compile;
 mod emit;
 mod model;
 mod program;
+mod sweep;
 
 pub use bound::{Bound, StartValues};
 pub use emit::emit_tape;
-pub use model::Model;
+pub use model::{DerivativeForm, Model};
 
 /// Sampled inputs of an experiment as functions of time.
 pub trait InputSource: Sync {

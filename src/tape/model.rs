@@ -1,6 +1,8 @@
 //! The compiled model.
 
+use super::InputSource;
 use super::program::Program;
+use super::sweep::{Scratch, Sweep};
 use crate::linear::SparsityPattern;
 use crate::mechanics::Variable;
 
@@ -54,11 +56,44 @@ pub(super) struct Layout {
     pub variables: usize,
 }
 
-/// Structurally non-zero elements of a matrix and the program that computes them.
+/// How derivatives are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DerivativeForm {
+    /// Symbolic for small models, swept for large ones.
+    Automatic,
+    /// As expressions: fast to evaluate, but their number grows with the square of the model.
+    Symbolic,
+    /// By tangents through the linearised program.
+    Swept,
+}
+
+/// Structurally non-zero elements of a matrix and what computes them: a program, or for large models a sweep.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Derivative {
     pub program: Program,
+    pub sweep: Option<Sweep>,
     pub elements: Vec<Element>,
+}
+
+impl Derivative {
+    /// All elements into their registers; the programs they are derivatives of must have run.
+    pub fn evaluate(&self, registers: &mut [f64], inputs: &dyn InputSource, scratch: &mut Scratch) {
+        match &self.sweep {
+            Some(sweep) => sweep.run(registers, inputs, scratch),
+            None => self.program.execute(registers, inputs),
+        }
+    }
+
+    /// Where the elements are written to.
+    pub fn place(&mut self, slot: impl Fn(usize, usize) -> usize) {
+        for element in &mut self.elements {
+            element.slot = slot(element.row as usize, element.column as usize) as u32;
+        }
+    }
+
+    fn work(&self) -> usize {
+        self.sweep.as_ref().map_or(self.program.instruction_count(), Sweep::work)
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -150,7 +185,11 @@ impl Model {
 
     /// Instructions per evaluation of rates, Jacobian, parameter derivatives, outputs.
     pub fn instruction_counts(&self) -> [usize; 4] {
-        [&self.rates, &self.jacobian.program, &self.parameter_derivative.program, &self.outputs]
-            .map(Program::instruction_count)
+        [
+            self.rates.instruction_count(),
+            self.jacobian.work(),
+            self.parameter_derivative.work(),
+            self.outputs.instruction_count(),
+        ]
     }
 }

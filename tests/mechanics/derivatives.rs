@@ -5,7 +5,7 @@ use ident::expression::{Node, Unary};
 use ident::integrate::Dynamics;
 use ident::mechanics::derive;
 use ident::study::*;
-use ident::tape::{Bound, InputSource, Model};
+use ident::tape::{Bound, DerivativeForm, InputSource, Model};
 
 /// sin(3 t + i) and its derivatives.
 struct Sines;
@@ -225,4 +225,44 @@ fn reach_tells_which_parameter_moves_which_output() {
     let reach = model.parameter_reach();
     assert!(reach[..6].iter().all(|outputs| outputs.iter().all(|&reached| reached)));
     assert!(reach[6].iter().all(|&reached| !reached));
+}
+
+fn dense_jacobian(model: &Model, theta: &[f64], t: f64, y: &[f64]) -> Vec<f64> {
+    let mut bound = Bound::new(model, &Sines, theta);
+    let pattern = bound.pattern().clone();
+    let mut values = vec![0.0; pattern.len()];
+    bound.jacobian(t, y, &vec![0.0; y.len()], 0.7, &mut values);
+    let mut dense = vec![0.0; y.len() * y.len()];
+    for ((row, column), value) in pattern.entries().zip(values) {
+        dense[column * y.len() + row] = value;
+    }
+    dense
+}
+
+/// Both forms of derivatives are the same numbers: by variables, by parameters, of rates and of measures.
+#[test]
+fn swept_derivatives_equal_symbolic_ones() {
+    let system = derive(&cart().study).expect("derivable");
+    let [symbolic, swept] =
+        [DerivativeForm::Symbolic, DerivativeForm::Swept].map(|form| Model::compile_with(&system, form));
+    let mut random = Random(3);
+    let (n, p, m) = (symbolic.dimension(), THETA.len(), symbolic.output_count());
+    for trial in 0..20 {
+        let t = 0.3 * f64::from(trial);
+        let y: Vec<f64> = (0..n).map(|_| random.next()).collect();
+        assert_close(&dense_jacobian(&swept, &THETA, t, &y), &dense_jacobian(&symbolic, &THETA, t, &y), 1e-13);
+        let by_parameter = |model: &Model| {
+            let mut values = vec![0.0; n * p];
+            Bound::new(model, &Sines, &THETA).parameter_derivative(t, &y, &vec![0.0; n], &mut values);
+            values
+        };
+        assert_close(&by_parameter(&swept), &by_parameter(&symbolic), 1e-13);
+        let of_outputs = |model: &Model| {
+            let (mut by_state, mut by_parameter) = (vec![0.0; m * n], vec![0.0; m * p]);
+            Bound::new(model, &Sines, &THETA).output_derivatives(t, &y, &mut by_state, &mut by_parameter);
+            [by_state, by_parameter].concat()
+        };
+        assert_close(&of_outputs(&swept), &of_outputs(&symbolic), 1e-13);
+    }
+    assert_eq!(swept.parameter_reach(), symbolic.parameter_reach());
 }
