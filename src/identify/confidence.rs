@@ -1,9 +1,10 @@
 //! Covariance of the estimate from its gradient and the autocorrelation of its residual (method 7).
 
 use super::fitting::Fitted;
-use crate::signal::{autocovariance, effective_count};
+use super::noise;
+use crate::signal::effective_count;
 use crate::simulation::Compiled;
-use crate::statistics::{Covariance, confidence_interval, identifiability, stationary_noise_gamma};
+use crate::statistics::{Covariance, confidence_interval, identifiability};
 use crate::study::Parameter;
 
 /// Level of all intervals.
@@ -11,8 +12,6 @@ const LEVEL: f64 = 0.95;
 /// Singular values below this share of the largest belong to directions that the data do not determine. The gradient is
 /// accurate to about the integrator's tolerance, so smaller values are not distinguishable from zero.
 const RANK_THRESHOLD: f64 = 1e-6;
-/// Lags of the residual's autocovariance that enter the covariance, as a share of the record.
-const LAG_SHARE: f64 = 0.02;
 
 /// What is known about the parameters after a fit.
 #[derive(Clone, Debug, Default)]
@@ -31,6 +30,11 @@ pub struct Confidence {
     pub bic: f64,
     /// Directions of infinite variance: orthonormal in parameters scaled by [`Parameter::scale`].
     pub directions: Vec<Vec<f64>>,
+    /// Per measure of the study: standard deviation of the noise before the prefilter, SI, the fitted parameters' share
+    /// included (method 4.5); `None` where nothing is compared.
+    pub noise: Vec<Option<f64>>,
+    /// Order of the autoregressive noise model of each block of the residual; 0 is white.
+    pub noise_orders: Vec<usize>,
     standard_deviations: Vec<Option<f64>>,
     estimate: Vec<f64>,
 }
@@ -52,8 +56,8 @@ impl Confidence {
     }
 }
 
-/// Covariance `Xi^-1 Gamma Xi^-1` (method 3.30) with the pseudo-inverse over the determined directions, Gamma from the
-/// residual's autocovariance under a Bartlett window (Newey-West-1987): coloured residuals widen the intervals.
+/// Covariance `Xi^-1 Gamma Xi^-1` (method 3.30) with the pseudo-inverse over the determined directions, Gamma from an
+/// autoregressive model of each channel's residual: coloured residuals widen the intervals.
 pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     let parameters = &compiled.study.parameters;
     let count = fitted.theta.len();
@@ -74,12 +78,11 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     let scales: Vec<f64> = parameters.iter().map(Parameter::scale).collect();
     let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
     let gradient = gradient_with_priors(compiled, fitted);
-    let noise: Vec<(usize, Vec<f64>)> = fitted
-        .blocks
-        .iter()
-        .map(|block| (block.rows.len(), bartlett_autocovariance(fitted, block.rows.clone())))
-        .collect();
-    let gamma = stationary_noise_gamma(&gradient, count, &noise);
+    let models = noise::models(fitted);
+    confidence.noise_orders = models.iter().map(noise::NoiseModel::order).collect();
+    confidence.noise = noise::deviations(compiled, fitted, &gradient, &scales, RANK_THRESHOLD);
+    let inverse = Covariance::new(&gradient, &scales, 1.0, None, RANK_THRESHOLD).map(|covariance| covariance.matrix);
+    let gamma = noise::gamma(fitted, &gradient, &models, &inverse.unwrap_or_else(|_| vec![0.0; count * count]));
     if let Ok(analysis) = identifiability(&gradient, &scales, &fitted.theta, &names, RANK_THRESHOLD) {
         confidence.undetermined = analysis.undetermined.iter().map(|direction| direction.description.clone()).collect();
         confidence.identifiability = analysis.measures;
@@ -112,21 +115,6 @@ fn gradient_with_priors(compiled: &Compiled, fitted: &Fitted) -> Vec<f64> {
             let extra = priors.iter().map(move |&(k, weight)| if k == j { weight } else { 0.0 });
             column.iter().copied().chain(extra)
         })
-        .collect()
-}
-
-/// Autocovariance of the weighted residual about zero (a mean left in it is misfit, not noise level) with Bartlett
-/// weights and the fitted parameters' share (method 4.5).
-fn bartlett_autocovariance(fitted: &Fitted, rows: std::ops::Range<usize>) -> Vec<f64> {
-    let count = fitted.theta.len();
-    let free = 1.0 - count as f64 / fitted.residual.len().max(count + 1) as f64;
-    let residual = &fitted.residual[rows];
-    let lags = ((residual.len() as f64 * LAG_SHARE) as usize).min(residual.len().saturating_sub(1));
-    let mean = residual.iter().sum::<f64>() / residual.len().max(1) as f64;
-    autocovariance(residual, lags)
-        .into_iter()
-        .enumerate()
-        .map(|(lag, value)| (value + mean * mean) / free * (1.0 - lag as f64 / (lags + 1) as f64))
         .collect()
 }
 

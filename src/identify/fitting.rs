@@ -39,6 +39,9 @@ pub struct Fitted {
     pub cost_history: Vec<f64>,
     pub stop_reason: StopReason,
     pub at_bound: Vec<bool>,
+    /// Prefilter and sampling rate (Hz) of each record of the fit.
+    pub filters: Vec<Prefilter>,
+    pub rates: Vec<f64>,
     pub iterations: usize,
     pub simulations: usize,
     pub failed_simulations: usize,
@@ -80,6 +83,7 @@ pub fn fit(
         None => first_weights(&compiled.study, records, &filters),
     };
     let rounds = if settings.weights.is_some() { 0 } else { REWEIGHTINGS };
+    let gains: Vec<f64> = filters.iter().map(Prefilter::noise_gain).collect();
     let mut start = settings.start.clone().unwrap_or_else(|| start_values(compiled));
     let mut problem = Problem::new(compiled, records.to_vec(), filters, weighting.weights.clone());
     let mut iterations = 0;
@@ -94,7 +98,7 @@ pub fn fit(
         start.clone_from(&estimate.theta);
         let blocks = problem.blocks();
         let residual = &estimate.residual[..problem.residual_count()];
-        let next = residual_deviations(&weighting, &compiled.study, residual, &blocks, estimate.theta.len());
+        let next = residual_deviations(&weighting, &compiled.study, residual, &blocks, &gains, estimate.theta.len());
         let settled = next.largest_change(&weighting) < WEIGHT_CHANGE;
         if round == rounds || settled || estimate.stop_reason == StopReason::Interrupted {
             return Ok(finish(estimate, weighting, &problem, history, iterations));
@@ -176,6 +180,8 @@ fn finish(
         cost_history: history,
         stop_reason: estimate.stop_reason,
         at_bound,
+        filters: problem.prefilters.clone(),
+        rates: problem.records.iter().map(|record| 1.0 / record.sample_step()).collect(),
         iterations,
         simulations: problem.simulations,
         failed_simulations: problem.failures,

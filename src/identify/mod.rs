@@ -6,6 +6,7 @@
 
 mod confidence;
 mod fitting;
+mod noise;
 mod problem;
 mod report;
 mod result;

@@ -63,26 +63,29 @@ pub(super) fn first_weights(study: &Study, records: &[&Record], filters: &[Prefi
     weighting
 }
 
-/// Weights from the residual of a fit with `parameter_count` parameters; stated noise stays.
+/// Weights from the residual of a fit with `parameter_count` parameters; stated noise stays. `gains`: share of white noise's
+/// variance that passes each record's prefilter, so that weights refer to the noise before it (method 4.6).
 pub(super) fn residual_deviations(
     current: &Weighting,
     study: &Study,
     residual: &[f64],
     blocks: &[Block],
+    gains: &[f64],
     parameter_count: usize,
 ) -> Weighting {
     let mut next = current.clone();
     // Each channel pays its share of the fitted parameters (method 4.5).
-    let free = 1.0 - parameter_count as f64 / residual.len().max(parameter_count + 1) as f64;
+    let passed = |block: &Block| block.rows.len() as f64 * gains[block.record];
+    let all: f64 = blocks.iter().map(passed).sum();
+    let free = 1.0 - parameter_count as f64 / all.max(parameter_count as f64 + 1.0);
     for (measure, declared) in study.measures.iter().enumerate() {
         if declared.noise.is_some() || current.weights[measure] == 0.0 {
             continue;
         }
-        let rows: Vec<&[f64]> =
-            blocks.iter().filter(|block| block.measure == measure).map(|block| &residual[block.rows.clone()]).collect();
-        let squares: f64 = rows.iter().flat_map(|row| row.iter()).map(|value| value * value).sum();
-        let count: usize = rows.iter().map(|row| row.len()).sum();
-        let deviation = (squares / (count as f64 * free)).sqrt() / current.weights[measure];
+        let own = || blocks.iter().filter(|block| block.measure == measure);
+        let squares: f64 = own().flat_map(|block| &residual[block.rows.clone()]).map(|value| value * value).sum();
+        let count: f64 = own().map(passed).sum();
+        let deviation = declared.weight * (squares / (count * free)).sqrt() / current.weights[measure];
         if deviation > 0.0 {
             next.weights[measure] = declared.weight / deviation;
             next.sources[measure] = RESIDUAL;

@@ -29,7 +29,8 @@ pub fn noise_variance(sum_of_squares: f64, trace: f64) -> f64 {
 ///
 /// With P the stacked gradient and X = P^T P, the residual of block i is F d_i - P_i X^+ sum_j P_j^T F d_j; its
 /// expected square is linear in the channels' variances, which solves for them. Returns one variance per channel number
-/// 0 ..= largest. `filter` applies the prefilter to a column (a zero-phase filter is its own transpose but for the ends).
+/// 0 ..= largest. `filter` applies the prefilter of a block (by its place in `blocks`) to a column; a zero-phase filter
+/// is its own transpose but for the ends.
 /// `prior_information`: p x p Gram matrix of prior rows, if any. Undetermined directions (below `threshold`, scaled by
 /// `scale`) count as not fitted.
 pub fn noise_variances(
@@ -37,7 +38,7 @@ pub fn noise_variances(
     scale: &[f64],
     prior_information: Option<&[f64]>,
     threshold: f64,
-    filter: &dyn Fn(&mut [f64]),
+    filter: &dyn Fn(usize, &mut [f64]),
 ) -> Result<Vec<f64>, DecompositionError> {
     let count = scale.len();
     let scaling = |gram: Vec<f64>| -> Vec<f64> {
@@ -47,7 +48,11 @@ pub fn noise_variances(
         .iter()
         .map(|block| scaling(transposed_product(block.residual.len(), block.gradient, block.gradient)))
         .collect();
-    let coloured: Vec<Vec<f64>> = blocks.iter().map(|block| scaling(filtered_gram(block, filter))).collect();
+    let coloured: Vec<Vec<f64>> = blocks
+        .iter()
+        .enumerate()
+        .map(|(i, block)| scaling(filtered_gram(block, &|column| filter(i, column))))
+        .collect();
     let prior = prior_information.map(|gram| scaling(gram.to_vec()));
     let mut information = prior.clone().unwrap_or_else(|| vec![0.0; count * count]);
     grams.iter().for_each(|gram| information.iter_mut().zip(gram).for_each(|(sum, value)| *sum += value));

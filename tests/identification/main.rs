@@ -1,4 +1,5 @@
 //! Identification with honest statistics, on the shipped studies.
 
+mod coverage;
 mod shipped;
 mod validity;

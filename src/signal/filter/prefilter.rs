@@ -133,6 +133,17 @@ impl Prefilter {
         ends + interior - removed
     }
 
+    /// Autocovariance of white noise of variance one behind the whole operation, away from the ends, at the lags
+    /// 0, `stride`, .. `largest * stride`.
+    pub fn noise_autocovariance(&self, largest: usize, stride: usize) -> Vec<f64> {
+        if self.sections.is_empty() {
+            return (0..=largest).map(|lag| if lag == 0 { 1.0 } else { 0.0 }).collect();
+        }
+        let response = self.interior_response();
+        let product = |lag: usize| response.iter().zip(response.iter().skip(lag)).map(|(a, b)| a * b).sum();
+        (0..=largest).map(|lag| product(lag * stride)).collect()
+    }
+
     /// Impulse response of the whole operation, centred.
     fn interior_response(&self) -> Vec<f64> {
         let half = 4 * self.padding + 1;

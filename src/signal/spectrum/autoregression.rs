@@ -20,14 +20,19 @@ impl AutoRegression {
     /// Fit of a given order (cut to N/2) by Burg's method (Burg-1975), to the samples as they are: take a mean out
     /// before if it is not part of the signal.
     pub fn burg(samples: &[f64], order: usize) -> Self {
-        let ladder = burg_ladder(samples, order.min(samples.len() / 2));
+        let ladder = burg_ladder(&[samples], order.min(samples.len() / 2));
         Self::from_ladder(ladder)
     }
 
     /// Order 0 ..= `largest_order` with the smallest BIC.
     pub fn choose(samples: &[f64], largest_order: usize) -> Self {
-        let count = samples.len() as f64;
-        let mut ladder = burg_ladder(samples, largest_order.min(samples.len() / 4));
+        Self::choose_over(&[samples], samples.len(), largest_order)
+    }
+
+    /// As [`AutoRegression::choose`] from several stretches of one process, together worth `independent` samples.
+    pub fn choose_over(stretches: &[&[f64]], independent: usize, largest_order: usize) -> Self {
+        let count = independent as f64;
+        let mut ladder = burg_ladder(stretches, largest_order.min(independent / 4));
         let criterion = |order: usize, variance: f64| count * variance.ln() + order as f64 * count.ln();
         let best = ladder
             .iter()
@@ -37,6 +42,31 @@ impl AutoRegression {
             .map_or(0, |(order, _)| order);
         ladder.truncate(best + 1);
         Self::from_ladder(ladder)
+    }
+
+    /// The predictor of a process with this autocovariance (lags 0 ..= order), by Levinson's recursion; a lower order where the
+    /// process is predicted perfectly.
+    pub fn from_autocovariance(autocovariance: &[f64]) -> Self {
+        let mut ladder = vec![(Vec::new(), autocovariance.first().copied().unwrap_or(1.0))];
+        for m in 1..autocovariance.len() {
+            let (previous, variance): (Vec<f64>, f64) = ladder[m - 1].clone();
+            let predicted: f64 = previous.iter().enumerate().map(|(k, a)| a * autocovariance[m - 1 - k]).sum();
+            let reflection = (autocovariance[m] - predicted) / variance;
+            if !(variance > 0.0 && reflection.abs() < 1.0) {
+                break;
+            }
+            let mut coefficients: Vec<f64> =
+                (0..m - 1).map(|k| previous[k] - reflection * previous[m - 2 - k]).collect();
+            coefficients.push(reflection);
+            ladder.push((coefficients, variance * (1.0 - reflection * reflection)));
+        }
+        Self::from_ladder(ladder)
+    }
+
+    /// Variance of the process.
+    pub fn power(&self) -> f64 {
+        let impulse: Vec<f64> = self.colour(&[1.0]);
+        impulse.iter().map(|value| value * value).sum()
     }
 
     fn from_ladder(ladder: Vec<(Vec<f64>, f64)>) -> Self {
@@ -60,6 +90,29 @@ impl AutoRegression {
         }
     }
 
+    /// The column shaped by the model, backward in time and with the decaying rest before its first sample, such that scalar
+    /// products of shaped columns are `x^T R y` with R the covariance matrix of the process.
+    pub fn colour(&self, column: &[f64]) -> Vec<f64> {
+        let deviation = self.variance.max(0.0).sqrt();
+        if self.coefficients.is_empty() {
+            return column.iter().map(|value| deviation * value).collect();
+        }
+        let mut shaped: Vec<f64> = Vec::with_capacity(2 * column.len());
+        let mut largest = 0.0_f64;
+        let rest = (REST * column.len()).max(SHORTEST_REST);
+        for t in 0..column.len() + rest {
+            let input = column.len().checked_sub(t + 1).map_or(0.0, |index| deviation * column[index]);
+            let memory: f64 = self.coefficients.iter().enumerate().take(t).map(|(k, a)| a * shaped[t - 1 - k]).sum();
+            shaped.push(input + memory);
+            largest = largest.max(shaped[t].abs());
+            let settled = |values: &[f64]| values.iter().all(|value| value.abs() <= SETTLED * largest);
+            if t >= column.len() + self.order() && settled(&shaped[t - self.order()..]) {
+                break;
+            }
+        }
+        shaped
+    }
+
     /// Power spectral density (one-sided, per Hz) at a frequency.
     pub fn density(&self, frequency: f64, sampling_rate: f64) -> f64 {
         let angle = std::f64::consts::TAU * frequency / sampling_rate;
@@ -73,28 +126,40 @@ impl AutoRegression {
     }
 }
 
+/// The rest of a shaped column ends where it has decayed to this share.
+const SETTLED: f64 = 1e-7;
+/// or after so many lengths of the column.
+const REST: usize = 4;
+/// but not before so many samples.
+const SHORTEST_REST: usize = 2000;
+
 /// Predictors of the orders 0 ..= `order` with their error variances. Stops early where the signal is predicted
 /// perfectly.
-fn burg_ladder(samples: &[f64], order: usize) -> Vec<(Vec<f64>, f64)> {
-    let count = samples.len();
-    let power = samples.iter().map(|value| value * value).sum::<f64>() / count.max(1) as f64;
-    let mut ladder = vec![(Vec::new(), power)];
-    let (mut forward, mut backward) = (samples.to_vec(), samples.to_vec());
+fn burg_ladder(stretches: &[&[f64]], order: usize) -> Vec<(Vec<f64>, f64)> {
+    let count: usize = stretches.iter().map(|samples| samples.len()).sum();
+    let power = stretches.iter().flat_map(|samples| samples.iter()).map(|value| value * value).sum::<f64>();
+    let mut ladder = vec![(Vec::new(), power / count.max(1) as f64)];
+    let mut errors: Vec<(Vec<f64>, Vec<f64>)> =
+        stretches.iter().map(|samples| (samples.to_vec(), samples.to_vec())).collect();
     for m in 1..=order {
         let (mut product, mut energy) = (0.0, 0.0);
-        for t in m..count {
-            product += forward[t] * backward[t - 1];
-            energy += forward[t] * forward[t] + backward[t - 1] * backward[t - 1];
+        for (forward, backward) in &errors {
+            for t in m..forward.len() {
+                product += forward[t] * backward[t - 1];
+                energy += forward[t] * forward[t] + backward[t - 1] * backward[t - 1];
+            }
         }
         let (previous, variance) = ladder[m - 1].clone();
         if energy <= 0.0 || variance <= 0.0 {
             break;
         }
         let reflection = 2.0 * product / energy;
-        for t in (m..count).rev() {
-            let (f, b) = (forward[t], backward[t - 1]);
-            forward[t] = f - reflection * b;
-            backward[t] = b - reflection * f;
+        for (forward, backward) in &mut errors {
+            for t in (m..forward.len()).rev() {
+                let (f, b) = (forward[t], backward[t - 1]);
+                forward[t] = f - reflection * b;
+                backward[t] = b - reflection * f;
+            }
         }
         let mut coefficients: Vec<f64> = (0..m - 1).map(|k| previous[k] - reflection * previous[m - 2 - k]).collect();
         coefficients.push(reflection);

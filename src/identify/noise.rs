@@ -1,0 +1,167 @@
+//! The noise behind a residual: its level before the prefilter, and its colour.
+
+use super::fitting::Fitted;
+use crate::signal::AutoRegression;
+use crate::simulation::Compiled;
+use crate::statistics::{NoiseChannel, noise_variances};
+
+/// Orders of autoregressive models that are tried.
+const LARGEST_ORDER: usize = 24;
+/// The parameters are never said to have taken more than the rest of the noise's energy.
+const LEAST_LEFT: f64 = 0.1;
+/// Order of the autoregressive image of the prefilter.
+const FILTER_ORDER: usize = 16;
+
+/// Stationary model of the weighted, filtered noise of one channel in one record.
+///
+/// What a low-pass leaves of the band would make a model at the full sampling rate badly conditioned; it is made of every
+/// `stride`-th sample, all such series together. The colour that the prefilter gives is known; only that of the noise before it
+/// is estimated.
+#[derive(Clone, Debug)]
+pub(super) struct NoiseModel {
+    stride: usize,
+    filter: AutoRegression,
+    model: AutoRegression,
+}
+
+impl NoiseModel {
+    pub fn order(&self) -> usize {
+        self.model.order()
+    }
+
+    /// See [`AutoRegression::colour`].
+    fn colour(&self, column: &[f64]) -> Vec<f64> {
+        self.model.colour(&self.filter.colour(column))
+    }
+
+    /// Variance of the filtered noise.
+    fn power(&self) -> f64 {
+        self.colour(&[1.0]).iter().map(|value| value * value).sum()
+    }
+}
+
+/// One model per block of the residual, order by the Bayesian criterion.
+pub(super) fn models(fitted: &Fitted) -> Vec<NoiseModel> {
+    fitted
+        .blocks
+        .iter()
+        .map(|block| {
+            let stride = stride(fitted, block.record);
+            let residual = &fitted.residual[block.rows.clone()];
+            let order = if stride > 1 { FILTER_ORDER } else { 0 };
+            let shape = fitted.filters[block.record].noise_autocovariance(order, stride);
+            let filter = AutoRegression::from_autocovariance(&shape);
+            let mut series: Vec<Vec<f64>> = (0..stride).map(|phase| every(residual, phase, stride)).collect();
+            let deviation = filter.variance.sqrt();
+            for values in &mut series {
+                filter.whiten(values);
+                values.iter_mut().for_each(|value| *value /= deviation);
+            }
+            let views: Vec<&[f64]> = series.iter().map(Vec::as_slice).collect();
+            let model = AutoRegression::choose_over(&views, residual.len() / stride, LARGEST_ORDER);
+            NoiseModel { stride, filter, model }
+        })
+        .collect()
+}
+
+/// Samples that a band up to the stop edge leaves independent.
+fn stride(fitted: &Fitted, record: usize) -> usize {
+    let Some(design) = fitted.filters[record].design() else { return 1 };
+    // Where both passes together leave a tenth of the amplitude, a hundredth of the power.
+    let band_end = design.cutoff * 9f64.powf(0.5 / f64::from(design.order.max(1)));
+    (fitted.rates[record] / (2.0 * band_end)).floor().max(1.0) as usize
+}
+
+fn every(values: &[f64], phase: usize, stride: usize) -> Vec<f64> {
+    values.iter().skip(phase).step_by(stride).copied().collect()
+}
+
+/// Gamma = Phi^T S^T S Cov(D) S^T S Phi of method 3.30, p x p. `gradient`: N x p, weighted and filtered; rows after the last
+/// block (priors) count with variance one. The fitted parameters have taken their share of the residual, from which the models are:
+/// it is given back to the level (method 4.5 for coloured noise; `inverse` is Xi^+).
+pub(super) fn gamma(fitted: &Fitted, gradient: &[f64], models: &[NoiseModel], inverse: &[f64]) -> Vec<f64> {
+    let count = fitted.theta.len();
+    let rows = gradient.len() / count.max(1);
+    let mut gamma = vec![0.0; count * count];
+    let mut add = |columns: &[Vec<f64>], factor: f64| add_gram(&mut gamma, columns, factor);
+    let column = |j: usize, range: std::ops::Range<usize>| &gradient[j * rows + range.start..j * rows + range.end];
+    for (block, noise) in fitted.blocks.iter().zip(models) {
+        for phase in 0..noise.stride {
+            let shaped: Vec<Vec<f64>> =
+                (0..count).map(|j| noise.colour(&every(column(j, block.rows.clone()), phase, noise.stride))).collect();
+            // Shaped columns differ in length by their rest; what is missing is negligible.
+            add(&shaped, noise.stride as f64);
+        }
+    }
+    let energy: f64 = fitted.blocks.iter().zip(models).map(|(b, noise)| b.rows.len() as f64 * noise.power()).sum();
+    let taken: f64 = (0..count * count).map(|k| inverse[k] * gamma[k]).sum();
+    let left = (1.0 - taken / energy).clamp(LEAST_LEFT, 1.0);
+    if energy > 0.0 {
+        gamma.iter_mut().for_each(|value| *value /= left);
+    }
+    let mut add = |columns: &[Vec<f64>], factor: f64| add_gram(&mut gamma, columns, factor);
+    let rest: Vec<Vec<f64>> = (0..count).map(|j| column(j, fitted.residual.len()..rows).to_vec()).collect();
+    add(&rest, 1.0);
+    gamma
+}
+
+fn add_gram(gamma: &mut [f64], columns: &[Vec<f64>], factor: f64) {
+    let count = columns.len();
+    for j in 0..count {
+        for i in 0..count {
+            gamma[j * count + i] += factor * columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum::<f64>();
+        }
+    }
+}
+
+/// Standard deviation of the noise before the prefilter, per measure, SI (method 4.5).
+pub(super) fn deviations(
+    compiled: &Compiled,
+    fitted: &Fitted,
+    gradient_with_priors: &[f64],
+    scales: &[f64],
+    threshold: f64,
+) -> Vec<Option<f64>> {
+    let count = fitted.theta.len();
+    let measures = compiled.study.measures.len();
+    let rows = fitted.residual.len();
+    let mut numbers: Vec<usize> = fitted.blocks.iter().map(|block| block.measure).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let own: Vec<Vec<f64>> = fitted
+        .blocks
+        .iter()
+        .map(|block| {
+            let column = |j: usize| &fitted.gradient[j * rows + block.rows.start..j * rows + block.rows.end];
+            (0..count).flat_map(|j| column(j).iter().copied()).collect()
+        })
+        .collect();
+    let channels: Vec<NoiseChannel> = fitted
+        .blocks
+        .iter()
+        .zip(&own)
+        .map(|(block, gradient)| NoiseChannel {
+            channel: numbers.binary_search(&block.measure).unwrap_or(0),
+            residual: &fitted.residual[block.rows.clone()],
+            gradient,
+            weight: fitted.weighting.weights[block.measure],
+            trace: fitted.filters[block.record].trace(block.rows.len()),
+        })
+        .collect();
+    let all_rows = gradient_with_priors.len() / count.max(1);
+    let prior: Vec<f64> = (0..count * count)
+        .map(|k| {
+            let part = |j: usize| &gradient_with_priors[j * all_rows + rows..(j + 1) * all_rows];
+            part(k % count).iter().zip(part(k / count)).map(|(a, b)| a * b).sum()
+        })
+        .collect();
+    let prior = (all_rows > rows).then_some(prior.as_slice());
+    let filter = |block: usize, column: &mut [f64]| fitted.filters[fitted.blocks[block].record].apply(column);
+    let mut deviations = vec![None; measures];
+    if let Ok(variances) = noise_variances(&channels, scales, prior, threshold, &filter) {
+        for (&measure, variance) in numbers.iter().zip(variances) {
+            deviations[measure] = Some(variance.sqrt()).filter(|deviation| deviation.is_finite());
+        }
+    }
+    deviations
+}
