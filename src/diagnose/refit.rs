@@ -37,6 +37,7 @@ pub(super) fn refit(
         start: Some(start),
         weights: Some(round.fitted.weighting.clone()),
         maximum_iterations: Some(maximum_iterations),
+        ..Settings::default()
     };
     let fitted = fit(&compiled, round.records, &settings, &mut |_| Control::Continue).ok()?;
     let deviance = round.deviance(&fitted.residual);

@@ -4,15 +4,19 @@
 //! *Out*: an [`Estimate`], whatever happens on the way; only a start that cannot be evaluated is a [`FitError`].
 //! *Must not happen here*: simulation, files, knowledge of bodies or names of channels.
 
+mod constrained;
 mod cost;
 mod levenberg_marquardt;
+mod loss;
 mod multi_start;
 mod prior;
 mod problem;
 mod step;
 
+pub use constrained::{Constraints, constrained};
 pub use cost::{ChannelCost, CostTree, magnitude_weight, noise_weight};
 pub use levenberg_marquardt::levenberg_marquardt;
-pub use multi_start::{latin_hypercube, multi_start};
-pub use prior::{GaussianPrior, WithPriors};
+pub use loss::{original, robust_deviation, transformed};
+pub use multi_start::{latin_hypercube, multi_start, parallel_starts};
+pub use prior::{PriorRow, WithPriors};
 pub use problem::*;

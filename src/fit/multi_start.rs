@@ -37,9 +37,7 @@ pub fn multi_start<P: LeastSquares + ?Sized>(
 ) -> Result<Vec<Estimate>, FitError> {
     let mut estimates = Vec::new();
     let mut first_error = None;
-    let further = latin_hypercube(further_starts, start.len(), seed);
-    let starts = std::iter::once(start.to_vec()).chain(further.iter().map(|point| inside(point, start, bounds)));
-    for point in starts {
+    for point in parallel_starts(start, bounds, further_starts, seed) {
         match levenberg_marquardt(problem, &point, bounds, options, observer) {
             Ok(estimate) => estimates.push(estimate),
             Err(error @ FitError::StartFails(_)) => first_error = first_error.or(Some(error)),
@@ -51,6 +49,12 @@ pub fn multi_start<P: LeastSquares + ?Sized>(
         Some(error) if estimates.is_empty() => Err(error),
         _ => Ok(estimates),
     }
+}
+
+/// The start itself and `further_starts` points as [`multi_start`] takes them, for searches that run beside each other.
+pub fn parallel_starts(start: &[f64], bounds: &Bounds, further_starts: usize, seed: u64) -> Vec<Vec<f64>> {
+    let further = latin_hypercube(further_starts, start.len(), seed);
+    std::iter::once(start.to_vec()).chain(further.iter().map(|point| inside(point, start, bounds))).collect()
 }
 
 fn inside(point: &[f64], start: &[f64], bounds: &Bounds) -> Vec<f64> {
@@ -65,7 +69,7 @@ fn inside(point: &[f64], start: &[f64], bounds: &Bounds) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::{EvaluationFailure, GaussianPrior, WithPriors};
+    use crate::fit::{EvaluationFailure, PriorRow, WithPriors};
 
     /// One slice per start on every axis, and the same points again.
     #[test]
@@ -121,11 +125,8 @@ mod tests {
                 Ok((vec![theta[0] - 1.0], vec![1.0, 0.0]))
             }
         }
-        let priors = [
-            GaussianPrior { parameter: 0, mean: 3.0, standard_deviation: 0.5 },
-            GaussianPrior { parameter: 1, mean: 7.0, standard_deviation: 2.0 },
-        ];
-        let mut problem = WithPriors { problem: &mut One, priors: &priors };
+        let rows = [PriorRow::gaussian(0, 3.0, 0.5), PriorRow::gaussian(1, 7.0, 2.0)];
+        let mut problem = WithPriors { problem: &mut One, rows: &rows };
         let mut quiet = |_: &Progress| Control::Continue;
         let bounds = Bounds::none(2);
         let estimate =

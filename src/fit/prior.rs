@@ -1,49 +1,56 @@
-//! Prior knowledge as further residual rows (method 3.16).
+//! Prior knowledge as further residual rows (method 3.16, 3.35).
 
 use super::{EvaluationFailure, LeastSquares};
 
-/// Normal prior of one parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GaussianPrior {
-    /// Index of the parameter.
-    pub parameter: usize,
-    pub mean: f64,
-    pub standard_deviation: f64,
+/// One row `sum_j weight_j theta_j - target`, of variance one: a normal prior of one parameter, or a row of what an
+/// independent result knows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PriorRow {
+    /// (index of the parameter, weight)
+    pub weights: Vec<(usize, f64)>,
+    pub target: f64,
 }
 
-/// A problem with one further row `(theta_j - mean) / standard_deviation` per prior, after the problem's own rows.
+impl PriorRow {
+    /// A normal prior of parameter `index`.
+    pub fn gaussian(index: usize, mean: f64, standard_deviation: f64) -> Self {
+        Self { weights: vec![(index, 1.0 / standard_deviation)], target: mean / standard_deviation }
+    }
+
+    pub fn residual(&self, theta: &[f64]) -> f64 {
+        self.weights.iter().map(|&(j, weight)| weight * theta[j]).sum::<f64>() - self.target
+    }
+
+    /// Derivative by parameter `index`.
+    pub fn slope(&self, index: usize) -> f64 {
+        self.weights.iter().filter(|(j, _)| *j == index).map(|(_, weight)| weight).sum()
+    }
+}
+
+/// A problem with the rows of prior knowledge after its own.
 ///
 /// The problem's residuals must then be weighted by noise standard deviations, or the two costs are not comparable.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct WithPriors<'a, P> {
-    pub problem: &'a mut P,
-    pub priors: &'a [GaussianPrior],
-}
-
-impl<P: LeastSquares> WithPriors<'_, P> {
-    fn append_rows(&self, theta: &[f64], residual: &mut Vec<f64>) {
-        residual
-            .extend(self.priors.iter().map(|prior| (theta[prior.parameter] - prior.mean) / prior.standard_deviation));
-    }
+    pub problem: P,
+    pub rows: &'a [PriorRow],
 }
 
 impl<P: LeastSquares> LeastSquares for WithPriors<'_, P> {
     fn residual(&mut self, theta: &[f64]) -> Result<Vec<f64>, EvaluationFailure> {
         let mut residual = self.problem.residual(theta)?;
-        self.append_rows(theta, &mut residual);
+        residual.extend(self.rows.iter().map(|row| row.residual(theta)));
         Ok(residual)
     }
 
     fn residual_and_gradient(&mut self, theta: &[f64]) -> Result<(Vec<f64>, Vec<f64>), EvaluationFailure> {
         let (mut residual, gradient) = self.problem.residual_and_gradient(theta)?;
         let rows = residual.len();
-        self.append_rows(theta, &mut residual);
+        residual.extend(self.rows.iter().map(|row| row.residual(theta)));
         let mut extended = Vec::with_capacity(residual.len() * theta.len());
         for j in 0..theta.len() {
             extended.extend_from_slice(&gradient[j * rows..(j + 1) * rows]);
-            extended.extend(
-                self.priors.iter().map(|prior| if prior.parameter == j { 1.0 / prior.standard_deviation } else { 0.0 }),
-            );
+            extended.extend(self.rows.iter().map(|row| row.slope(j)));
         }
         Ok((residual, extended))
     }

@@ -13,6 +13,16 @@ pub trait LeastSquares {
     fn residual_and_gradient(&mut self, theta: &[f64]) -> Result<(Vec<f64>, Vec<f64>), EvaluationFailure>;
 }
 
+impl<P: LeastSquares + ?Sized> LeastSquares for &mut P {
+    fn residual(&mut self, theta: &[f64]) -> Result<Vec<f64>, EvaluationFailure> {
+        (**self).residual(theta)
+    }
+
+    fn residual_and_gradient(&mut self, theta: &[f64]) -> Result<(Vec<f64>, Vec<f64>), EvaluationFailure> {
+        (**self).residual_and_gradient(theta)
+    }
+}
+
 /// The model could not be evaluated at some parameters (typically: the simulation broke down). Information, not an
 /// end: the optimiser shortens its step.
 #[derive(Clone, Debug, PartialEq)]

@@ -77,7 +77,7 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     }
     let scales: Vec<f64> = parameters.iter().map(Parameter::scale).collect();
     let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-    let gradient = gradient_with_priors(compiled, fitted);
+    let gradient = gradient_with_priors(fitted);
     let models = noise::models(fitted);
     confidence.noise_orders = models.iter().map(noise::NoiseModel::order).collect();
     confidence.noise = noise::deviations(compiled, fitted, &gradient, &scales, RANK_THRESHOLD);
@@ -97,24 +97,12 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     confidence
 }
 
-/// The gradient with prior knowledge as further rows, so that a prior determines what the data leave open.
-fn gradient_with_priors(compiled: &Compiled, fitted: &Fitted) -> Vec<f64> {
-    let priors: Vec<(usize, f64)> = compiled
-        .study
-        .parameters
-        .iter()
-        .enumerate()
-        .filter_map(|(j, parameter)| Some((j, 1.0 / parameter.prior?.standard_deviation)))
-        .collect();
+/// The gradient with prior knowledge as further rows, so that it determines what the data leave open.
+fn gradient_with_priors(fitted: &Fitted) -> Vec<f64> {
     let rows = fitted.residual.len().max(1);
-    fitted
-        .gradient
-        .chunks_exact(rows)
-        .enumerate()
-        .flat_map(|(j, column)| {
-            let extra = priors.iter().map(move |&(k, weight)| if k == j { weight } else { 0.0 });
-            column.iter().copied().chain(extra)
-        })
+    let columns = fitted.gradient.chunks_exact(rows).enumerate();
+    columns
+        .flat_map(|(j, column)| column.iter().copied().chain(fitted.prior_rows.iter().map(move |row| row.slope(j))))
         .collect()
 }
 

@@ -13,7 +13,7 @@ mod result;
 mod weights;
 
 pub use confidence::{Confidence, confidence};
-pub use fitting::{Fitted, Settings, fit, prefilters};
+pub use fitting::{Fitted, Settings, active_constraints, fit, prefilters};
 pub use problem::{Block, Problem};
 pub use report::identification;
 pub use result::*;

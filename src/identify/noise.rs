@@ -29,14 +29,9 @@ impl NoiseModel {
         self.model.order()
     }
 
-    /// See [`AutoRegression::colour`].
-    fn colour(&self, column: &[f64]) -> Vec<f64> {
-        self.model.colour(&self.filter.colour(column))
-    }
-
     /// Variance of the filtered noise.
     fn power(&self) -> f64 {
-        self.colour(&[1.0]).iter().map(|value| value * value).sum()
+        self.model.colour(&self.filter.colour(&[1.0])).iter().map(|value| value * value).sum()
     }
 }
 
@@ -59,7 +54,14 @@ pub(super) fn models(fitted: &Fitted) -> Vec<NoiseModel> {
             }
             let views: Vec<&[f64]> = series.iter().map(Vec::as_slice).collect();
             let model = AutoRegression::choose_over(&views, residual.len() / stride, LARGEST_ORDER);
-            NoiseModel { stride, filter, model }
+            let mut noise = NoiseModel { stride, filter, model };
+            let square = residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64;
+            let power = noise.power();
+            if power > 0.0 {
+                // The level from the whole residual: the image is least exact where the filter leaves least.
+                noise.model.variance *= square / power;
+            }
+            noise
         })
         .collect()
 }
@@ -86,11 +88,18 @@ pub(super) fn gamma(fitted: &Fitted, gradient: &[f64], models: &[NoiseModel], in
     let mut add = |columns: &[Vec<f64>], factor: f64| add_gram(&mut gamma, columns, factor);
     let column = |j: usize, range: std::ops::Range<usize>| &gradient[j * rows + range.start..j * rows + range.end];
     for (block, noise) in fitted.blocks.iter().zip(models) {
+        let filtered: Vec<Vec<f64>> = (0..count)
+            .map(|j| {
+                let mut own = column(j, block.rows.clone()).to_vec();
+                fitted.filters[block.record].apply(&mut own);
+                own
+            })
+            .collect();
         for phase in 0..noise.stride {
             let shaped: Vec<Vec<f64>> =
-                (0..count).map(|j| noise.colour(&every(column(j, block.rows.clone()), phase, noise.stride))).collect();
+                filtered.iter().map(|own| noise.model.colour(&every(own, phase, noise.stride))).collect();
             // Shaped columns differ in length by their rest; what is missing is negligible.
-            add(&shaped, noise.stride as f64);
+            add(&shaped, 1.0);
         }
     }
     let energy: f64 = fitted.blocks.iter().zip(models).map(|(b, noise)| b.rows.len() as f64 * noise.power()).sum();

@@ -3,12 +3,14 @@
 //! The residual is `S F (Y_measured - Y(theta))`, record by record, channel by channel: F the zero-phase prefilter (or the
 //! identity), S the channels' weights. Its gradient passes through the same chain (internal differentiation).
 
-use crate::fit::{EvaluationFailure, LeastSquares};
+use crate::fit::{EvaluationFailure, LeastSquares, transformed};
 use crate::signal::Prefilter;
 use crate::simulation::{Compiled, Gradient, Record, Trajectory, simulate};
+use crate::study::Loss;
 use rayon::prelude::*;
 
 /// What stays fixed while parameters move: the compiled study, the records, filter and weights.
+#[derive(Clone)]
 pub struct Problem<'a> {
     pub compiled: &'a Compiled,
     pub records: Vec<&'a Record>,
@@ -101,7 +103,8 @@ impl<'a> Problem<'a> {
         for (r, trajectory) in trajectories.iter().enumerate() {
             for (c, residual) in self.filtered_residuals(r, trajectory).into_iter().enumerate() {
                 let weight = self.weights[self.records[r].measures[c]];
-                stacked.extend(residual.into_iter().map(|value| weight * value));
+                let loss = self.compiled.study.solver.loss;
+                stacked.extend(residual.into_iter().map(|value| transformed(loss, weight * value).0));
             }
         }
         stacked
@@ -110,16 +113,22 @@ impl<'a> Problem<'a> {
     fn stacked_gradient(&self, trajectories: &[Trajectory]) -> Vec<f64> {
         let (rows, columns) = (self.residual_count(), self.parameter_count());
         let mut gradient = vec![0.0; rows * columns];
+        let loss = self.compiled.study.solver.loss;
         let mut offset = 0;
         for (r, trajectory) in trajectories.iter().enumerate() {
             let record = self.records[r];
             let samples = record.sample_count();
+            let residuals = if loss == Loss::Squares { Vec::new() } else { self.filtered_residuals(r, trajectory) };
             for (c, &measure) in record.measures.iter().enumerate() {
                 for j in 0..columns {
                     let target = &mut gradient[j * rows + offset..j * rows + offset + samples];
                     target.copy_from_slice(&trajectory.gradient[c][j * samples..(j + 1) * samples]);
                     self.prefilters[r].apply(target);
                     target.iter_mut().for_each(|value| *value *= -self.weights[measure]);
+                    if let Some(residual) = residuals.get(c) {
+                        let slope = |r: &f64| transformed(loss, self.weights[measure] * r).1;
+                        target.iter_mut().zip(residual).for_each(|(value, r)| *value *= slope(r));
+                    }
                 }
                 offset += samples;
             }

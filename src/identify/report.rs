@@ -1,7 +1,7 @@
 //! From a fit to what a reader is shown: units of the study, intervals, discrepancy tree, remarks.
 
 use super::confidence::{Confidence, confidence};
-use super::fitting::{Fitted, prefilters};
+use super::fitting::{Fitted, active_constraints, prefilters};
 use super::problem::Problem;
 use super::{ChannelFit, DiscrepancyNode, Identification, ParameterEstimate, RecordFit};
 use crate::simulation::{Compiled, Record, Trajectory};
@@ -99,6 +99,9 @@ fn parameter_remarks(compiled: &Compiled, fitted: &Fitted, confidence: &Confiden
                 parameter.name
             ));
         }
+    }
+    for constraint in active_constraints(&compiled.study, &fitted.theta) {
+        remarks.push(format!("the constraint `{constraint}` holds back the fit: intervals do not know of it"));
     }
     remarks.extend(confidence.undetermined.iter().map(|direction| format!("not determined by this data: {direction}")));
     if !fitted.stop_reason.converged() {

@@ -1,9 +1,10 @@
 //! Weights of the channels: first by magnitude, then by the deviation of the residual (method 3.20, IV.6).
 
 use super::problem::Block;
+use crate::fit::{original, robust_deviation};
 use crate::signal::Prefilter;
 use crate::simulation::Record;
-use crate::study::Study;
+use crate::study::{Loss, Study};
 
 /// Weights per measure and where they come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,7 +86,14 @@ pub(super) fn residual_deviations(
         let own = || blocks.iter().filter(|block| block.measure == measure);
         let squares: f64 = own().flat_map(|block| &residual[block.rows.clone()]).map(|value| value * value).sum();
         let count: f64 = own().map(passed).sum();
-        let deviation = declared.weight * (squares / (count * free)).sqrt() / current.weights[measure];
+        let spread = if study.solver.loss == Loss::Squares {
+            (squares / (count * free)).sqrt()
+        } else {
+            let rows = own().flat_map(|block| &residual[block.rows.clone()]);
+            let share = count / own().map(|block| block.rows.len()).sum::<usize>().max(1) as f64;
+            robust_deviation(rows.map(|value| original(study.solver.loss, *value))) / (share * free).sqrt()
+        };
+        let deviation = declared.weight * spread / current.weights[measure];
         if deviation > 0.0 {
             next.weights[measure] = declared.weight / deviation;
             next.sources[measure] = RESIDUAL;

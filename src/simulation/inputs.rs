@@ -8,6 +8,9 @@ use crate::tape::InputSource;
 #[derive(Clone, Debug)]
 pub struct RecordInputs {
     pub(super) channels: Vec<Channel>,
+    /// Index of the experiment (beyond the experiments: of a manoeuvre), which the study samples like an input behind its last
+    /// one where quantities differ between experiments.
+    pub(super) experiment: usize,
 }
 
 #[derive(Clone, Debug)]
@@ -18,9 +21,11 @@ pub(super) enum Channel {
 
 impl InputSource for RecordInputs {
     fn sample(&self, input: u32, order: u8, t: f64) -> f64 {
-        match &self.channels[input as usize] {
-            Channel::Sampled(interpolant) => interpolant.evaluate(t, usize::from(order)),
-            Channel::Formula(formula) => formula.evaluate(t, usize::from(order)),
+        match self.channels.get(input as usize) {
+            Some(Channel::Sampled(interpolant)) => interpolant.evaluate(t, usize::from(order)),
+            Some(Channel::Formula(formula)) => formula.evaluate(t, usize::from(order)),
+            None if order == 0 => self.experiment as f64,
+            None => 0.0,
         }
     }
 }

@@ -20,12 +20,14 @@ pub fn manoeuvre(study: &Study, index: usize) -> Record {
     let count = (manoeuvre.duration / manoeuvre.step * (1.0 + 1e-12)).ceil().max(1.0) as usize;
     let step = manoeuvre.duration / count as f64;
     let criteria = study.criteria.iter().enumerate().filter(|(_, criterion)| criterion.manoeuvre == index);
+    let experiment = study.experiments.len() + index;
+    let channels = formulas.into_iter().map(Channel::Formula).collect();
     Record {
-        experiment: study.experiments.len() + index,
+        experiment,
         name: manoeuvre.name.clone(),
         role: Role::Test,
         file: PathBuf::new(),
-        inputs: RecordInputs { channels: formulas.into_iter().map(Channel::Formula).collect() },
+        inputs: RecordInputs { channels, experiment },
         breakpoints,
         times: (0..=count).map(|k| k as f64 * step).collect(),
         first: 0,

@@ -164,7 +164,7 @@ fn record(
         name: experiment.name.clone(),
         role: experiment.role,
         file: path,
-        inputs: RecordInputs { channels: inputs.into_iter().map(Channel::Sampled).collect() },
+        inputs: RecordInputs { channels: inputs.into_iter().map(Channel::Sampled).collect(), experiment: index },
         breakpoints,
         times,
         first: rows.start,

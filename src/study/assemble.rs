@@ -32,6 +32,7 @@ impl<'a> Checker<'a> {
         let experiments = self.finished_experiments();
         let manoeuvres = self.finished_manoeuvres();
         let criteria = self.finished_criteria();
+        let constraints = self.finished_constraints();
         let (filter, remove_mean) = self.finished_filter();
         let solver = self.finished_solver();
         let groups = self.finished_groups();
@@ -60,6 +61,7 @@ impl<'a> Checker<'a> {
             time: self.time,
             gravity,
             parameters,
+            constraints,
             inputs: std::mem::take(&mut self.inputs),
             bodies: std::mem::take(&mut self.bodies),
             joints,

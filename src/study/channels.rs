@@ -118,7 +118,8 @@ impl<'a> Checker<'a> {
             self.known_fields(&format!("measure `{name}`"), measure.fields, &known);
             let zero = self.graph.constant(0.0);
             let value = self.site_value(Site::Measure(index), measure.name.span);
-            let value = value.unwrap_or(Typed::new(zero, Dimension::ONE));
+            let mut value = value.unwrap_or(Typed::new(zero, Dimension::ONE));
+            value.node = self.with_offsets(index, value.node);
             let unit = match measure.unit.map(read_unit) {
                 Some(Ok(unit)) => unit,
                 _ => Unit::coherent(value.dimension),

@@ -107,6 +107,10 @@ pub(super) struct Checker<'a> {
     pub parameter_index: HashMap<String, usize>,
     /// Per parameter: its target was met (paths) or the name was used.
     pub parameter_met: Vec<bool>,
+    /// Targets that have a value of their own in each experiment, and what they stand for.
+    pub per_experiment: HashMap<String, crate::expression::Node>,
+    /// Per measure: offsets of single experiments (index of the experiment, parameter).
+    pub offsets: Vec<(usize, usize, crate::expression::Node)>,
     pub constants: Vec<Constant>,
     pub topology: Topology<'a>,
     pub bodies: Vec<Body>,
@@ -151,6 +155,8 @@ impl<'a> Checker<'a> {
             parameters: Vec::new(),
             parameter_index: HashMap::new(),
             parameter_met: Vec::new(),
+            per_experiment: HashMap::new(),
+            offsets: Vec::new(),
             constants: Vec::new(),
             topology: Topology::default(),
             bodies: Vec::new(),
@@ -336,7 +342,10 @@ impl<'a> Checker<'a> {
         self.parameter_met[index] = true;
         let (symbol, unit) = (self.parameters[index].symbol, &self.parameters[index].unit);
         let (dimension, writing) = (unit.dimension, unit.angle_content());
-        let node = self.graph.variable(symbol);
+        let node = match self.per_experiment.get(target) {
+            Some(node) => *node,
+            None => self.graph.variable(symbol),
+        };
         Some(Typed { writing, ..Typed::new(node, dimension) })
     }
 

@@ -30,6 +30,7 @@ pub(super) struct Declarations<'a> {
     pub manoeuvres: Vec<Manoeuvre<'a>>,
     pub criteria: Vec<Criterion<'a>>,
     pub identify: Vec<Identified<'a>>,
+    pub constraints: Vec<&'a Expression>,
     pub filter: Option<(Option<&'a Lowpass>, bool, Span)>,
     pub solver: Option<&'a [Field]>,
     pub laws: HashMap<&'a str, Law<'a>>,
@@ -264,7 +265,10 @@ fn sort<'a>(result: &mut Declarations<'a>, item: &'a Item, by_variant: bool, dia
             let (unit, title) = (unit.as_ref(), title.as_ref());
             result.criteria.push(Criterion { name, unit, title, value, manoeuvre, fields });
         }
-        ItemKind::Identify { lines } => add_identified(result, lines, by_variant, diagnostics),
+        ItemKind::Identify { lines, constraints } => {
+            add_identified(result, lines, by_variant, diagnostics);
+            result.constraints.extend(constraints);
+        }
         ItemKind::Filter { lowpass, remove_mean } => {
             let filter = (lowpass.as_ref(), *remove_mean, item.span);
             once(&mut result.filter, filter, "filter", item.span, diagnostics);

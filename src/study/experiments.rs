@@ -4,7 +4,7 @@ use super::checker::{Allowed, Checker, Entity, Scope};
 use super::declarations::Experiment as Declared;
 use super::fields::{find, value_span};
 use super::identify::written_unit;
-use super::model::{Experiment, Filter, Method, Role, Solver, Start, StartBase};
+use super::model::{Experiment, Filter, Loss, Method, Role, Solver, Start, StartBase};
 use crate::diagnostics::{Code, Diagnostic, similar_name};
 use crate::expression::{Node, Symbol};
 use crate::quantities::Dimension;
@@ -23,7 +23,11 @@ impl<'a> Checker<'a> {
         let fields = experiment.fields;
         let name = experiment.name;
         let owner = format!("experiment `{}`", name.text);
-        self.known_fields(&owner, fields, &["data", "window", "start", "measures", "columns", "time", "inputs"]);
+        self.known_fields(
+            &owner,
+            fields,
+            &["data", "window", "start", "measures", "columns", "time", "inputs", "offsets"],
+        );
         let role = self.role(experiment.role);
         let data = match find(fields, "data") {
             Some(field) => self.field_text(field),
@@ -302,9 +306,9 @@ impl<'a> Checker<'a> {
     }
 
     pub fn finished_solver(&mut self) -> Solver {
-        let mut solver = Solver { relative_tolerance: 1e-6, method: Method::Automatic };
+        let mut solver = Solver { relative_tolerance: 1e-6, method: Method::Automatic, loss: Loss::Squares };
         let Some(fields) = self.declared.solver else { return solver };
-        self.known_fields("`solver`", fields, &["tolerance", "method"]);
+        self.known_fields("`solver`", fields, &["tolerance", "method", "loss"]);
         if let Some(field) = find(fields, "tolerance")
             && let Some(expression) = self.field_expression(field)
             && let Some(value) = self.fixed_number(expression, None, Dimension::ONE, (field.key.span, "`tolerance`"))
@@ -320,6 +324,12 @@ impl<'a> Checker<'a> {
         }
         let word =
             find(fields, "method").and_then(|field| self.field_word(field, &["automatic", "bdf", "runge_kutta"]));
+        let loss = find(fields, "loss").and_then(|field| self.field_word(field, &["squares", "huber", "student"]));
+        solver.loss = match loss {
+            Some("huber") => Loss::Huber,
+            Some("student") => Loss::Student,
+            _ => Loss::Squares,
+        };
         solver.method = match word {
             Some("bdf") => Method::Bdf,
             Some("runge_kutta") => Method::RungeKutta,

@@ -3,12 +3,12 @@
 use super::checker::{Allowed, Checker, Entity, Scope};
 use super::declarations::Identified;
 use super::evaluate::{Typed, literal};
-use super::model::{Constant, Parameter, Prior};
+use super::model::{Constant, Constraint, Parameter, Prior};
 use super::units::read_unit;
 use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use crate::expression::Node;
 use crate::quantities::{Dimension, Unit};
-use crate::syntax::{Expression, Name};
+use crate::syntax::{Expression, ExpressionKind, Name, Operator};
 
 const NUMBERS: Scope = Scope::Study(Allowed::Number);
 
@@ -20,10 +20,49 @@ impl<'a> Checker<'a> {
                 && let Some(parameter) = self.read_parameter(*identified)
             {
                 self.parameter_index.insert(parameter.name.clone(), self.parameters.len());
-                self.parameters.push(parameter);
-                self.parameter_met.push(false);
+                if identified.line.per_experiment {
+                    self.split_by_experiment(parameter);
+                } else {
+                    self.parameters.push(parameter);
+                    self.parameter_met.push(false);
+                }
             }
         }
+        self.read_offsets();
+    }
+
+    /// What must hold between parameters, as `value <= 0`.
+    pub fn finished_constraints(&mut self) -> Vec<Constraint> {
+        let declared: &'a super::declarations::Declarations<'a> = self.declared;
+        declared.constraints.iter().filter_map(|written| self.constraint(written)).collect()
+    }
+
+    fn constraint(&mut self, written: &'a Expression) -> Option<Constraint> {
+        let scope = Scope::Study(Allowed::Constant);
+        let sides = match &written.kind {
+            ExpressionKind::Binary { operator: Operator::Less | Operator::LessEqual, left, right } => (left, right),
+            ExpressionKind::Binary { operator: Operator::Greater | Operator::GreaterEqual, left, right } => {
+                (right, left)
+            }
+            _ => {
+                let diagnostic = Diagnostic::error(Code::WRONG_VALUE, "a constraint compares two quantities")
+                    .label(written.span, "no comparison")
+                    .help("write e.g. `constrain d_rebound >= d_compression`");
+                return self.fail(diagnostic, scope);
+            }
+        };
+        let (small, large) = (self.evaluate(sides.0, scope), self.evaluate(sides.1, scope));
+        let (small, large) = (small?, large?);
+        let message = || format!("{} cannot be compared with {}", small.dimension, large.dimension);
+        self.same_dimension((small, sides.0.span), (large, sides.1.span), message, scope)?;
+        let value = self.graph.subtract(small.node, large.node);
+        let symbols = self.graph.symbols_of(&[value]);
+        if !symbols.iter().any(|symbol| self.is_parameter(*symbol)) {
+            let diagnostic = Diagnostic::error(Code::WRONG_VALUE, "this constraint holds no parameter")
+                .label(written.span, "depends on nothing that is identified");
+            return self.fail(diagnostic, scope);
+        }
+        Some(Constraint { value, text: crate::syntax::print_expression(written), span: written.span })
     }
 
     /// Free names, constants and paths may be identified; other declared things are no numbers.

@@ -25,6 +25,7 @@ mod load;
 mod manoeuvres;
 mod model;
 mod names;
+mod nuisance;
 mod parts;
 mod paths;
 mod places;

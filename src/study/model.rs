@@ -20,6 +20,8 @@ pub struct Study {
     /// Gravitational acceleration in ground axes, m/s^2; zero where the study declares none.
     pub gravity: [Node; 3],
     pub parameters: Vec<Parameter>,
+    /// What must hold between parameters.
+    pub constraints: Vec<Constraint>,
     pub inputs: Vec<Input>,
     pub bodies: Vec<Body>,
     pub joints: Vec<Joint>,
@@ -88,6 +90,15 @@ impl Parameter {
             1.0
         }
     }
+}
+
+/// `value <= 0`, of parameters and numbers only.
+#[derive(Clone, Debug)]
+pub struct Constraint {
+    pub value: Node,
+    /// As written.
+    pub text: String,
+    pub span: Span,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -504,6 +515,18 @@ pub struct Filter {
 pub struct Solver {
     pub relative_tolerance: f64,
     pub method: Method,
+    pub loss: Loss,
+}
+
+/// How residuals count in the cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Loss {
+    #[default]
+    Squares,
+    /// Squares up to 1.345 standard deviations, linear beyond: outliers count less.
+    Huber,
+    /// Of a Student distribution with 4 degrees of freedom: far outliers hardly count.
+    Student,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -94,6 +94,8 @@ fn is_keyword(rule: Rule) -> bool {
             | model_word
             | part_word
             | for_word
+            | per_word
+            | constrain_word
             | table_word
             | points_word
             | add_word
@@ -409,13 +411,22 @@ impl<'a> Builder<'a> {
     }
 
     fn identify(&mut self, mut parts: Parts<'_>) -> Built<ItemKind> {
-        let mut lines = Vec::new();
+        let (mut lines, mut constraints, mut spans) = (Vec::new(), Vec::new(), Vec::new());
         while let Some(pair) = parts.next() {
-            lines.push(self.identify_line(pair)?);
+            if pair.as_rule() == Rule::constrain {
+                let mut inside = Parts::of(pair);
+                self.documentation(&mut inside);
+                let constraint = self.expression(inside.next()?);
+                spans.push(constraint.span);
+                constraints.push(constraint);
+            } else {
+                let line = self.identify_line(pair)?;
+                spans.push(line.span);
+                lines.push(line);
+            }
         }
-        let spans: Vec<Span> = lines.iter().map(|line| line.span).collect();
         self.check_separators(&spans);
-        Some(ItemKind::Identify { lines })
+        Some(ItemKind::Identify { lines, constraints })
     }
 
     fn identify_line(&mut self, pair: Pair<'_, Rule>) -> Built<IdentifyLine> {
@@ -426,12 +437,13 @@ impl<'a> Builder<'a> {
         let lower = self.expression(parts.next()?);
         let upper = self.expression(parts.next()?);
         let start = self.expression(parts.next()?);
-        let prior = match parts.next() {
+        let prior = match parts.take(Rule::expression) {
             Some(mean) => Some((self.expression(mean), self.expression(parts.next()?))),
             None => None,
         };
+        let per_experiment = parts.take(Rule::per_experiment).is_some();
         let span = target.span.to(whole);
-        Some(IdentifyLine { target, lower, upper, start, prior, span })
+        Some(IdentifyLine { target, lower, upper, start, prior, per_experiment, span })
     }
 
     fn filter(&mut self, mut parts: Parts<'_>) -> Built<ItemKind> {

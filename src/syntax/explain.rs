@@ -416,6 +416,8 @@ fn keyword(rule: Rule) -> Option<&'static str> {
         Rule::of_word => "of",
         Rule::in_word | Rule::limits => "in",
         Rule::for_word => "for",
+        Rule::per_word | Rule::per_experiment => "per",
+        Rule::constrain_word | Rule::constrain => "constrain",
         Rule::from_word => "from",
         Rule::prior_word => "prior",
         Rule::at_word => "at",

@@ -87,7 +87,7 @@ fn kind(kind: &ItemKind) -> String {
             let names = format!("criterion {}{}{}", name.text, optional_unit(unit), optional_text(title));
             with_fields(&format!("{names} = {} in {}", print_expression(value), manoeuvre.text), fields)
         }
-        ItemKind::Identify { lines } => identify(lines),
+        ItemKind::Identify { lines, constraints } => identify(lines, constraints),
         ItemKind::Filter { lowpass, remove_mean } => filter(lowpass.as_ref(), *remove_mean),
         ItemKind::Solver { fields } => braces("solver", &field_lines(fields), ",", Layout::OneLineIfItFits),
         ItemKind::Variant { name, base, changes } => {
@@ -277,8 +277,9 @@ fn body(name: &Name, fields: &[Field], points: &[Field]) -> String {
     braces(&format!("body {}", name.text), &lines, ",", Layout::OneLineIfItFits)
 }
 
-fn identify(lines: &[IdentifyLine]) -> String {
-    let lines: Vec<String> = lines.iter().map(identify_line).collect();
+fn identify(lines: &[IdentifyLine], constraints: &[Expression]) -> String {
+    let constraints = constraints.iter().map(|constraint| format!("constrain {}", print_expression(constraint)));
+    let lines: Vec<String> = lines.iter().map(identify_line).chain(constraints).collect();
     let layout = if lines.len() > 1 { Layout::Lines } else { Layout::OneLineIfItFits };
     braces("identify", &lines, "", layout)
 }
@@ -290,7 +291,8 @@ fn identify_line(line: &IdentifyLine) -> String {
         .as_ref()
         .map(|(mean, deviation)| format!(" prior {} +- {}", print_expression(mean), print_expression(deviation)));
     let start = print_expression(&line.start);
-    format!("{} in {lower} .. {upper} from {start}{}", line.target.text, prior.unwrap_or_default())
+    let own = if line.per_experiment { " per experiment" } else { "" };
+    format!("{} in {lower} .. {upper} from {start}{}{own}", line.target.text, prior.unwrap_or_default())
 }
 
 fn filter(lowpass: Option<&Lowpass>, remove_mean: bool) -> String {

@@ -62,8 +62,8 @@ pub enum ItemKind {
         manoeuvre: Name,
         fields: Vec<Field>,
     },
-    /// `identify { lines }`
-    Identify { lines: Vec<IdentifyLine> },
+    /// `identify { lines, constrain d_r >= d_c }`
+    Identify { lines: Vec<IdentifyLine>, constraints: Vec<Expression> },
     /// `filter { lowpass butterworth pass 5 Hz (2 dB) stop 7 Hz (20 dB) zero_phase, remove_mean }`
     Filter { lowpass: Option<Lowpass>, remove_mean: bool },
     /// `solver { tolerance = 1e-6, method = bdf }`
@@ -175,6 +175,8 @@ pub struct IdentifyLine {
     pub upper: Expression,
     pub start: Expression,
     pub prior: Option<(Expression, Expression)>,
+    /// `per experiment`: a value of its own in each.
+    pub per_experiment: bool,
     pub span: Span,
 }
 

@@ -169,7 +169,7 @@ impl<'t, 'd> Elaborator<'t, 'd> {
                 ItemKind::Constant { name, value } => {
                     self.constants.insert(name.text.clone(), value.clone());
                 }
-                ItemKind::Identify { lines } => {
+                ItemKind::Identify { lines, .. } => {
                     self.targets.extend(lines.iter().map(|line| line.target.text.clone()));
                 }
                 _ => {}

@@ -67,7 +67,12 @@ impl Elaborator<'_, '_> {
                 self.expression(value, None, scope);
             }
             ItemKind::Experiment { fields, .. } => self.experiment_fields(fields, scope),
-            ItemKind::Identify { lines } => lines.iter_mut().for_each(|line| self.identify_line(line, scope)),
+            ItemKind::Identify { lines, constraints } => {
+                lines.iter_mut().for_each(|line| self.identify_line(line, scope));
+                constraints.iter_mut().for_each(|constraint| {
+                    self.expression(constraint, None, scope);
+                });
+            }
             ItemKind::Solver { fields } => self.fields(fields, "", scope),
             // Written out elsewhere, or without names of the study.
             ItemKind::Study { .. }
