@@ -1,5 +1,8 @@
 //! The language is read, printed and read again; errors are told in an engineer's words.
 
+#[path = "syntax/generated.rs"]
+mod generated;
+
 use ident::diagnostics::{Sources, render};
 use ident::syntax::{Tree, parse, print};
 use std::fs;
@@ -309,4 +312,14 @@ fn highlighting_knows_every_keyword() {
         count += 1;
     }
     assert!(count > 40, "only {count} keywords found in the grammar");
+}
+
+/// What ships with the tool is in canonical layout.
+#[test]
+fn shipped_texts_are_formatted() {
+    for path in shipped_folders().iter().flat_map(|folder| study_files(folder)) {
+        let text = fs::read_to_string(&path).expect("readable file");
+        let formatted = ident::syntax::format(0, &text).unwrap_or_else(|findings| panic!("{findings:?}"));
+        assert!(formatted == text, "run `ident fmt {}`", path.display());
+    }
 }

@@ -1,5 +1,6 @@
 //! `ident check STUDY`
 
+use super::output::show;
 use super::session::Session;
 use super::{Failed, Format};
 use crate::mechanics::emit_model;
@@ -27,6 +28,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
             session.compile(variant)?;
         }
     }
-    print!("{}", emit_model(&compiled.study, &compiled.system));
+    show(&emit_model(&compiled.study, &compiled.system));
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! `ident compile STUDY --emit flat|tree|model|equations|tape`
 
+use super::output::show;
 use super::session::Session;
 use super::{Failed, Format};
 use crate::mechanics::{emit_equations, emit_model, emit_tree};
@@ -38,7 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     let session = Session::open(&arguments.study, Format::Text)?;
     if arguments.emit == Emit::Flat {
         let text = flat_text(&session.loaded, Some(&arguments.variant)).map_err(|findings| session.fail(&findings))?;
-        print!("{text}");
+        show(&text);
         return Ok(());
     }
     let compiled = session.compile(&arguments.variant)?;
@@ -49,6 +50,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
         Emit::Equations => emit_equations(&compiled.study, &compiled.system),
         Emit::Tape => emit_tape(&compiled.model),
     };
-    print!("{text}");
+    show(&text);
     Ok(())
 }

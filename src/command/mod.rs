@@ -9,6 +9,8 @@ mod compile;
 mod diagnose;
 mod explain;
 mod fit;
+mod format;
+mod new;
 mod output;
 mod progress;
 mod session;
@@ -43,6 +45,10 @@ enum Command {
     Compare(compare::Arguments),
     /// Judge what the identified model is good for: criteria with confidence
     Validate(validate::Arguments),
+    /// Bring study files into canonical layout
+    Fmt(format::Arguments),
+    /// Start a study
+    New(new::Arguments),
     /// Explain a diagnostic code
     Explain(explain::Arguments),
 }
@@ -93,6 +99,8 @@ pub fn run() -> ExitCode {
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Validate(arguments) => validate::run(&arguments),
+        Command::Fmt(arguments) => format::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
     };
     match outcome {

@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all.
+//! Files that appear whole or not at all; text on standard output.
 
 use super::Failed;
 use std::io::Write;
@@ -18,6 +18,16 @@ pub(super) fn write_whole(path: &Path, content: &str) -> Result<(), Failed> {
         eprintln!("error: cannot write {}: {error}", path.display());
         Failed
     })
+}
+
+/// Writes to standard output. A reader that has seen enough and goes away (`| head`) is no error.
+pub(super) fn show(text: &str) {
+    let mut output = std::io::stdout().lock();
+    if let Err(error) = output.write_all(text.as_bytes()).and_then(|()| output.flush())
+        && error.kind() != std::io::ErrorKind::BrokenPipe
+    {
+        eprintln!("error: cannot write to standard output: {error}");
+    }
 }
 
 /// Temporary files are private to the user; results are not.

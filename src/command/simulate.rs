@@ -1,9 +1,9 @@
-//! `ident simulate STUDY`
+//! `ident simulate STUDY`: its experiments and manoeuvres.
 
-use super::output::write_whole;
+use super::output::{show, write_whole};
 use super::session::Session;
 use super::{Failed, StudyArguments};
-use crate::simulation::{Compiled, Gradient, Record, simulate};
+use crate::simulation::{Compiled, Gradient, Record, manoeuvre, simulate};
 use std::path::PathBuf;
 
 #[derive(clap::Args, Debug)]
@@ -13,7 +13,7 @@ pub(super) struct Arguments {
     /// Parameter values instead of the study's start values, e.g. `--set "mu=0.1"` (in the study's unit)
     #[arg(long = "set", value_name = "NAME=VALUE")]
     values: Vec<String>,
-    /// Folder for one CSV file per experiment (default: standard output)
+    /// Folder for one CSV file per experiment and manoeuvre (default: standard output)
     #[arg(long, value_name = "DIR")]
     output: Option<PathBuf>,
 }
@@ -24,7 +24,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     let session = Session::open(&study.study, study.format)?;
     let compiled = session.compile(&study.variant)?;
     let theta = parameters(&compiled, &arguments.values)?;
-    let records = session.records(&compiled.study, study)?;
+    let mut records =
+        if compiled.study.experiments.is_empty() { Vec::new() } else { session.records(&compiled.study, study)? };
+    records.extend((0..compiled.study.manoeuvres.len()).map(|index| {
+        let mut record = manoeuvre(&compiled.study, index);
+        record.measures = (0..compiled.study.measures.len()).collect();
+        record
+    }));
     let mut tables = Vec::new();
     for record in &records {
         let table = table(&compiled, record, &theta).map_err(|explanation| {
@@ -36,7 +42,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     for (record, table) in tables {
         match &arguments.output {
             Some(folder) => write_whole(&folder.join(format!("{}.csv", record.name)), &table)?,
-            None => print!("{table}"),
+            None => show(&table),
         }
     }
     Ok(())

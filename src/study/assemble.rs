@@ -285,7 +285,7 @@ impl<'a> Checker<'a> {
                 .label(span, "nothing depends on it");
             self.report(diagnostic, SCOPE);
         }
-        if self.declared.experiments.is_empty() {
+        if self.declared.experiments.is_empty() && self.declared.manoeuvres.is_empty() {
             let diagnostic = Diagnostic::warning(Code::UNUSED_DECLARATION, "the study has no experiment").help(
                 "add `experiment NAME { data = \"file.csv\", start = equilibrium }` to compare it with measurements",
             );

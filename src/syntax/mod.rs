@@ -8,6 +8,7 @@ mod build;
 mod build_expression;
 mod build_structure;
 mod explain;
+mod format;
 mod grammar;
 mod print;
 mod read;
@@ -15,6 +16,7 @@ mod scan;
 mod split;
 mod tree;
 
+pub use format::{NotFormatted, format};
 pub use print::{print, print_expression, print_item};
 pub use read::parse;
 pub use tree::*;
