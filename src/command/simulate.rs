@@ -1,9 +1,9 @@
 //! `ident simulate STUDY`: its experiments and manoeuvres.
 
-use super::output::{show, write_whole};
+use super::output::{json, show, write_whole};
 use super::session::Session;
-use super::{Failed, StudyArguments};
-use crate::simulation::{Compiled, Gradient, Record, manoeuvre, simulate};
+use super::{Failed, Format, StudyArguments};
+use crate::simulation::{Compiled, Gradient, Record, Trajectory, manoeuvre, simulate, slowness};
 use std::path::PathBuf;
 
 #[derive(clap::Args, Debug)]
@@ -16,6 +16,9 @@ pub(super) struct Arguments {
     /// Folder for one CSV file per experiment and manoeuvre (default: standard output)
     #[arg(long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Show what limited the steps, in which share of them and when; channels are written only with `--output`
+    #[arg(long)]
+    why_slow: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
@@ -31,18 +34,44 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
         record.measures = (0..compiled.study.measures.len()).collect();
         record
     }));
-    let mut tables = Vec::new();
+    let mut trajectories = Vec::new();
     for record in &records {
-        let table = table(&compiled, record, &theta).map_err(|explanation| {
-            eprintln!("error: {explanation}");
+        let trajectory = simulate(&compiled, record, &theta, Gradient::None).map_err(|failure| {
+            eprintln!("error: {failure}\nhelp: {}", failure.help);
             Failed
         })?;
-        tables.push((record, table));
+        trajectories.push((record, trajectory));
     }
-    for (record, table) in tables {
+    if arguments.why_slow {
+        show_slowness(&compiled, &trajectories, study.format)?;
+    }
+    for (record, trajectory) in &trajectories {
+        let table = table(&compiled, record, trajectory).map_err(|error| {
+            eprintln!("error: the channels cannot be written: {error}");
+            Failed
+        })?;
         match &arguments.output {
             Some(folder) => write_whole(&folder.join(format!("{}.csv", record.name)), &table)?,
+            None if arguments.why_slow => {}
             None => show(&table),
+        }
+    }
+    Ok(())
+}
+
+fn show_slowness(compiled: &Compiled, trajectories: &[(&Record, Trajectory)], format: Format) -> Result<(), Failed> {
+    match format {
+        Format::Text => {
+            for (record, trajectory) in trajectories {
+                show(&format!("{}\n{}\n", record.name, slowness(compiled, trajectory)));
+            }
+        }
+        Format::Json => {
+            let runs: serde_json::Map<String, serde_json::Value> = trajectories
+                .iter()
+                .map(|(record, trajectory)| (record.name.clone(), serde_json::json!(slowness(compiled, trajectory))))
+                .collect();
+            show(&format!("{}\n", json(serde_json::to_string_pretty(&runs))?));
         }
     }
     Ok(())
@@ -67,9 +96,7 @@ fn parameters(compiled: &Compiled, given: &[String]) -> Result<Vec<f64>, Failed>
 }
 
 /// Time and simulated channels in the study's units as CSV.
-fn table(compiled: &Compiled, record: &Record, theta: &[f64]) -> Result<String, String> {
-    let trajectory = simulate(compiled, record, theta, Gradient::None)
-        .map_err(|failure| format!("{failure}\nhelp: {}", failure.help))?;
+fn table(compiled: &Compiled, record: &Record, trajectory: &Trajectory) -> Result<String, String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let measures = record.measures.iter().map(|&measure| &compiled.study.measures[measure]);
     let mut head = vec!["t [s]".to_owned()];

@@ -4,7 +4,7 @@ use super::confidence::{Confidence, confidence};
 use super::fitting::{Fitted, active_constraints, prefilters};
 use super::problem::Problem;
 use super::{ChannelFit, DiscrepancyNode, Identification, ParameterEstimate, RecordFit};
-use crate::simulation::{Compiled, Record, Trajectory};
+use crate::simulation::{Compiled, Record, Trajectory, certify};
 use crate::study::{Group, Role};
 
 /// Reports `fitted` on all `records` (the estimation records among them). Records that cannot be simulated with these
@@ -24,6 +24,7 @@ pub fn identification(compiled: &Compiled, fitted: &Fitted, records: &[&Record])
         }
     }
     remarks.extend(parameter_remarks(compiled, fitted, &confidence));
+    let gradient_digits = gradient_digits(compiled, fitted, records, &mut remarks);
     Identification {
         variant: compiled.study.variant.clone(),
         parameters: parameters(compiled, fitted, &confidence),
@@ -42,8 +43,25 @@ pub fn identification(compiled: &Compiled, fitted: &Fitted, records: &[&Record])
         simulations: fitted.simulations,
         failed_simulations: fitted.failed_simulations,
         stop_reason: fitted.stop_reason.to_string(),
-        gradient_digits: None,
+        gradient_digits,
         remarks,
+    }
+}
+
+/// Digits to which the gradient agrees with differences along the same steps, on the estimation records.
+fn gradient_digits(
+    compiled: &Compiled,
+    fitted: &Fitted,
+    records: &[&Record],
+    remarks: &mut Vec<String>,
+) -> Option<f64> {
+    let estimation: Vec<&Record> = records.iter().copied().filter(|r| r.role == Role::Estimation).collect();
+    match certify(compiled, &estimation, &fitted.theta) {
+        Ok(digits) => digits,
+        Err(failure) => {
+            remarks.push(format!("the gradient could not be checked: {failure}"));
+            None
+        }
     }
 }
 

@@ -3,6 +3,9 @@
 use super::problem::{Dynamics, Work};
 use super::structure::Structure;
 
+/// Parts of the run in which blame is counted.
+const PARTS: usize = 200;
+
 /// Wraps [`Dynamics`] for a vector `z` of length n (1 + p): first y, then the sensitivities row by row (component i,
 /// then parameter j), so that operations on a row run over all parameters without a gap.
 pub(super) struct Augmented<'d, D: ?Sized> {
@@ -38,7 +41,7 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
         };
         let structure = Structure::new(dynamics, t, y, y_prime);
         let explicit = dynamics.explicit_rates(t, y, &mut vec![0.0; n]);
-        let work = Work { limited_by: vec![0; n], limited_span: vec![(f64::NAN, f64::NAN); n], ..Work::default() };
+        let work = Work { limited_by: vec![0; n], limited_when: vec![Vec::new(); n], ..Work::default() };
         Self {
             dynamics,
             n,
@@ -144,14 +147,14 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
         }
     }
 
-    /// Notes that `component` had the largest share in the error of the step that ends at `t`.
+    /// Notes that `component` had the largest share in the error of the step that begins at `t`.
     pub fn blame(&mut self, component: usize, t: f64) {
         self.work.limited_by[component] += 1;
-        let span = &mut self.work.limited_span[component];
-        if span.0.is_nan() {
-            span.0 = t;
-        }
-        span.1 = t;
+        let (begin, end) = self.work.span;
+        let counts = &mut self.work.limited_when[component];
+        counts.resize(PARTS, 0);
+        let part = PARTS as f64 * (t - begin) / (end - begin).max(f64::MIN_POSITIVE);
+        counts[(part.max(0.0) as usize).min(PARTS - 1)] += 1;
     }
 }
 

@@ -83,7 +83,7 @@ pub trait Dynamics {
 
     /// Name of equation (row of F) `i` in the study's words, for messages: of a constraint, the loop it closes.
     fn equation_name(&self, i: usize) -> String {
-        format!("equation {i}")
+        format!("equation of {}", self.component_name(i))
     }
 }
 
@@ -187,8 +187,32 @@ pub struct Work {
     pub newton_iterations: usize,
     /// Steps whose size was limited by component i.
     pub limited_by: Vec<usize>,
-    /// First and last time at which component i limited the step.
-    pub limited_span: Vec<(f64, f64)>,
+    /// The same over time: counts per equal part of the run, empty for components that never limited a step.
+    pub limited_when: Vec<Vec<u32>>,
+    /// Start and end of the run.
+    pub span: (f64, f64),
+}
+
+impl Work {
+    /// Shortest time span that holds `share` of the steps limited by component `i`, to the resolution of the record;
+    /// none where it limited no step.
+    pub fn limited_span(&self, i: usize, share: f64) -> Option<(f64, f64)> {
+        let counts = self.limited_when.get(i)?;
+        let needed = (share * counts.iter().sum::<u32>() as f64).ceil().max(1.0) as u32;
+        let shortest = (0..counts.len())
+            .filter_map(|first| {
+                let mut sum = 0;
+                let last = counts[first..].iter().position(|count| {
+                    sum += count;
+                    sum >= needed
+                })?;
+                Some((last + 1, first))
+            })
+            .min()?;
+        let part = (self.span.1 - self.span.0) / counts.len() as f64;
+        let begin = self.span.0 + part * shortest.1 as f64;
+        Some((begin, begin + part * shortest.0 as f64))
+    }
 }
 
 /// Why an integration could not go on.

@@ -62,6 +62,7 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
         let (method, reason) = first_method(system.explicit, options.method);
         system.work.method = method.name();
         system.work.reason = reason.to_owned();
+        system.work.span = (start.time, times.last().copied().unwrap_or(start.time));
         let automatic = method == Method::Explicit && options.method == MethodChoice::Automatic;
         Self {
             recorder: Recorder::new(n, p, times, options.record_plan),

@@ -1,5 +1,6 @@
 //! A failed simulation as a value.
 
+use super::slowness::Slowness;
 use std::fmt;
 
 /// Why a record could not be simulated with these parameters, in the study's words.
@@ -12,6 +13,10 @@ pub struct Failure {
     pub cause: String,
     /// State to blame, e.g. `slide.velocity`.
     pub component: Option<String>,
+    /// Equations that contradict or repeat each other.
+    pub equations: Vec<String>,
+    /// What the run had cost until then, and who limited its steps.
+    pub slowness: Slowness,
     pub help: String,
 }
 
@@ -20,6 +25,12 @@ impl fmt::Display for Failure {
         write!(formatter, "experiment {}: {} at t = {:.6} s", self.experiment, self.cause, self.time)?;
         if let Some(component) = &self.component {
             write!(formatter, ", limited by {component}")?;
+        }
+        if !self.equations.is_empty() {
+            write!(formatter, ": {}", self.equations.join(", "))?;
+        }
+        if let Some(foremost) = self.slowness.foremost() {
+            write!(formatter, " (after {} steps; steps limited by {foremost})", self.slowness.steps)?;
         }
         Ok(())
     }
@@ -31,6 +42,7 @@ impl Failure {
         experiment: &str,
         failure: &crate::integrate::Failure,
         name: impl Fn(usize) -> String,
+        equation: impl Fn(usize) -> String,
     ) -> Self {
         use crate::integrate::FailureCause as Cause;
         let (cause, help) = match failure.cause {
@@ -72,7 +84,9 @@ impl Failure {
             experiment: experiment.to_owned(),
             time: failure.time,
             cause: cause.to_owned(),
-            component: failure.component.map(name),
+            component: failure.component.map(&name),
+            equations: failure.equations.iter().map(|&i| equation(i)).collect(),
+            slowness: Slowness::new(&failure.work, name),
             help: help.to_owned(),
         }
     }

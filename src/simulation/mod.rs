@@ -4,14 +4,18 @@
 //! samples, or a [`Failure`] in the study's words. *Must not happen here*: comparison with the measurement, decisions
 //! about parameters.
 
+mod certificate;
 mod failure;
 mod inputs;
 mod manoeuvre;
 mod prepare;
 mod run;
+mod slowness;
 
+pub use certificate::certify;
 pub use failure::Failure;
 pub use inputs::RecordInputs;
 pub use manoeuvre::manoeuvre;
 pub use prepare::{Record, prepare};
-pub use run::{Compiled, Gradient, Trajectory, probe, simulate};
+pub use run::{Compiled, Gradient, Trajectory, probe, simulate, slowness};
+pub use slowness::{Limit, Slowness};

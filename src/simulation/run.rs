@@ -2,12 +2,14 @@
 
 use super::failure::Failure;
 use super::prepare::Record;
+use super::slowness::Slowness;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::Symbol;
-use crate::integrate::{self, Dynamics, MethodChoice, Options, Solution, Start, Work};
+use crate::integrate::{self, Dynamics, MethodChoice, Options, Plan, Solution, Start, Work};
 use crate::mechanics::{self, System, Variable, VariableKind};
 use crate::study::{Method, Parameter, Study};
 use crate::tape::{Bound, Model};
+use std::sync::Arc;
 
 /// A study with its equations and closures.
 #[derive(Clone, Debug)]
@@ -73,6 +75,11 @@ pub enum Gradient {
     AllParameters,
 }
 
+/// What limited the steps of a run, with the model's names.
+pub fn slowness(compiled: &Compiled, trajectory: &Trajectory) -> Slowness {
+    Slowness::new(&trajectory.work, |i| compiled.model.variables()[i].name.clone())
+}
+
 /// The model's answer to one record, SI, at the compared samples.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
@@ -95,7 +102,7 @@ pub fn simulate(
     theta: &[f64],
     gradient: Gradient,
 ) -> Result<Trajectory, Failure> {
-    run(compiled, record, theta, gradient, false)
+    Ok(run(compiled, record, theta, gradient, false, options(&compiled.study))?.0)
 }
 
 /// As [`simulate`] without gradient, and with the place probes along the solution.
@@ -103,7 +110,30 @@ pub fn simulate(
 /// # Errors
 /// [`Failure`] with time, cause and the state to blame.
 pub fn probe(compiled: &Compiled, record: &Record, theta: &[f64]) -> Result<Trajectory, Failure> {
-    run(compiled, record, theta, Gradient::None, true)
+    Ok(run(compiled, record, theta, Gradient::None, true, options(&compiled.study))?.0)
+}
+
+/// As [`simulate`], and the sequence of steps taken.
+pub(super) fn record_plan(
+    compiled: &Compiled,
+    record: &Record,
+    theta: &[f64],
+    gradient: Gradient,
+) -> Result<(Trajectory, Plan), Failure> {
+    let options = Options { record_plan: true, ..options(&compiled.study) };
+    let (trajectory, plan) = run(compiled, record, theta, gradient, false, options)?;
+    Ok((trajectory, plan.unwrap_or_default()))
+}
+
+/// As [`simulate`] without gradient, along a given sequence of steps.
+pub(super) fn follow(
+    compiled: &Compiled,
+    record: &Record,
+    theta: &[f64],
+    plan: Arc<Plan>,
+) -> Result<Trajectory, Failure> {
+    let options = Options { follow_plan: Some(plan), ..options(&compiled.study) };
+    Ok(run(compiled, record, theta, Gradient::None, false, options)?.0)
 }
 
 fn run(
@@ -112,16 +142,18 @@ fn run(
     theta: &[f64],
     gradient: Gradient,
     with_probes: bool,
-) -> Result<Trajectory, Failure> {
+    options: Options,
+) -> Result<(Trajectory, Option<Plan>), Failure> {
     let with_gradient = gradient == Gradient::AllParameters;
     let mut bound = Bound::new(&compiled.model, &record.inputs, theta);
     bound.set_parameter_scale(compiled.study.parameters.iter().map(Parameter::scale).collect());
     let name = |i: usize| compiled.model.variables()[i].name.clone();
-    let blame = |failure: integrate::Failure| Failure::from_integration(&record.name, &failure, name);
-    let start = start(compiled, &mut bound, record, with_gradient).map_err(blame)?;
-    let options = options(&compiled.study);
-    let solution =
-        integrate::integrate(&mut bound, &start, &record.times, &record.breakpoints, &options).map_err(blame)?;
+    let blame = |bound: &Bound, failure: integrate::Failure| {
+        Failure::from_integration(&record.name, &failure, name, |i| bound.equation_name(i))
+    };
+    let start = start(compiled, &mut bound, record, with_gradient).map_err(|failure| blame(&bound, failure))?;
+    let mut solution = integrate::integrate(&mut bound, &start, &record.times, &record.breakpoints, &options)
+        .map_err(|failure| blame(&bound, failure))?;
     let (channels, gradients) = outputs(&mut bound, record, &solution, with_gradient);
     let finite = channels.iter().flatten().chain(gradients.iter().flatten()).all(|value| value.is_finite());
     if !finite {
@@ -130,11 +162,14 @@ fn run(
             time: record.times.last().copied().unwrap_or(start.time),
             cause: "a measured quantity became infinite or not a number".to_owned(),
             component: None,
+            equations: Vec::new(),
+            slowness: Slowness::new(&solution.work, name),
             help: "a measure or criterion divides by zero or takes the root of a negative number".to_owned(),
         });
     }
     let probes = if with_probes { probes(&mut bound, record, &solution) } else { Vec::new() };
-    Ok(Trajectory { channels, gradient: gradients, probes, work: solution.work })
+    let plan = solution.plan.take();
+    Ok((Trajectory { channels, gradient: gradients, probes, work: solution.work }, plan))
 }
 
 fn start(
