@@ -1,12 +1,14 @@
-//! How exact the gradient is: that of a run against differences of the same steps.
+//! How exact the gradient is: that of a run against an independent derivative along the same steps.
 //!
-//! Along a recorded sequence of steps the solution is a smooth function of the parameters, whose exact derivative the
-//! gradient claims to be. Central differences of sixth order of that function share no code with the gradient beyond the
-//! model itself: sensitivity equations, derivatives of the model, of the start and of the measures are all left out.
+//! Along a recorded sequence of steps the solution is a function of the parameters, whose exact derivative the gradient
+//! claims to be. Explicit models are differentiated anew by dual numbers, the variation integrated as part of the state;
+//! others by central differences of sixth order. Neither shares code with the gradient beyond the model itself:
+//! sensitivity equations, symbolic derivatives of the model, of the start and of the measures are left out.
 
 use super::failure::Failure;
 use super::prepare::Record;
 use super::run::{Compiled, Gradient, Trajectory, follow, record_plan};
+use super::tangent::tangent;
 use crate::integrate::Plan;
 use crate::study::Parameter;
 use rayon::prelude::*;
@@ -50,7 +52,7 @@ pub fn certify(compiled: &Compiled, records: &[&Record], theta: &[f64]) -> Resul
 fn direction(compiled: &Compiled, k: usize) -> Vec<f64> {
     let mut state = 0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(k as u64 + 1);
     let mut uniform = || {
-        // SplitMix64 (Steele-2014).
+        // SplitMix64 (Steele-Lea-Flood-2014).
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = state;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -65,6 +67,10 @@ fn digits(compiled: &Compiled, record: &Record, theta: &[f64], direction: &[f64]
     let (trajectory, plan) = record_plan(compiled, record, theta, Gradient::AllParameters)?;
     let plan = Arc::new(plan);
     let ours = directional(&trajectory, direction);
+    if compiled.model.state_count() == compiled.model.dimension() {
+        let exact = tangent(compiled, record, theta, direction, plan)?;
+        return Ok(Some(agreement(&trajectory, &ours, &exact)));
+    }
     let mut best = None;
     for distance in DISTANCES {
         if let Some(exact) = differences(compiled, record, theta, direction, distance, &plan) {
@@ -125,4 +131,26 @@ fn agreement(trajectory: &Trajectory, ours: &[Vec<f64>], exact: &[Vec<f64>]) -> 
         if difference == 0.0 { 16.0 } else { -(difference / size).log10() }
     };
     ours.iter().zip(exact).zip(&trajectory.channels).map(of_channel).fold(16.0, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_digit_is_seen() {
+        let trajectory = Trajectory {
+            channels: vec![vec![5.0, 6.0], vec![1.0, 1.0]],
+            gradient: vec![vec![1.0, 2.0, 3.0, 4.0], vec![0.0; 4]],
+            probes: Vec::new(),
+            work: crate::integrate::Work::default(),
+        };
+        let ours = directional(&trajectory, &[1.0, -1.0]);
+        assert_eq!(ours, [[-2.0, -2.0], [0.0, 0.0]]);
+        assert_eq!(agreement(&trajectory, &ours, &ours), 16.0);
+        let wrong = vec![vec![-2.0, -2.0 + 2e-5], vec![0.0, 0.0]];
+        assert!((agreement(&trajectory, &ours, &wrong) - 5.0).abs() < 1e-4);
+        let small = vec![vec![-2.0, -2.0], vec![0.0, 1e-9]];
+        assert!((agreement(&trajectory, &ours, &small) - 3.0).abs() < 1e-4);
+    }
 }

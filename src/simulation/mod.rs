@@ -11,6 +11,7 @@ mod manoeuvre;
 mod prepare;
 mod run;
 mod slowness;
+mod tangent;
 
 pub use certificate::certify;
 pub use failure::Failure;

@@ -172,7 +172,7 @@ fn run(
     Ok((Trajectory { channels, gradient: gradients, probes, work: solution.work }, plan))
 }
 
-fn start(
+pub(super) fn start(
     compiled: &Compiled,
     bound: &mut Bound,
     record: &Record,
@@ -207,7 +207,7 @@ fn stated(compiled: &Compiled, experiment: usize) -> Vec<bool> {
     compiled.system.states.iter().map(is_stated).chain(compiled.system.algebraic.iter().map(|_| false)).collect()
 }
 
-fn options(study: &Study) -> Options {
+pub(super) fn options(study: &Study) -> Options {
     Options {
         relative_tolerance: study.solver.relative_tolerance,
         method: match study.solver.method {

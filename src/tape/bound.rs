@@ -10,9 +10,9 @@ use crate::linear::SparsityPattern;
 ///
 /// `n` variables (states, then algebraic ones), `p` parameters, `m` outputs; all matrices column-major, all values SI.
 pub struct Bound<'a> {
-    model: &'a Model,
-    inputs: &'a dyn InputSource,
-    registers: Vec<f64>,
+    pub(super) model: &'a Model,
+    pub(super) inputs: &'a dyn InputSource,
+    pub(super) registers: Vec<f64>,
     /// Whether the registers hold the rates at the time and variables that stand in them.
     is_current: bool,
     parameter_scale: Vec<f64>,
@@ -72,7 +72,7 @@ impl<'a> Bound<'a> {
     }
 
     /// Rates and constraints at (t, y) into their registers, unless they are there.
-    fn update(&mut self, t: f64, y: &[f64]) {
+    pub(super) fn update(&mut self, t: f64, y: &[f64]) {
         let layout = self.model.layout;
         let same_time = self.is_current && self.registers[layout.time].to_bits() == t.to_bits();
         if !same_time {

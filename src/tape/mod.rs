@@ -13,10 +13,12 @@ mod emit;
 mod model;
 mod program;
 mod sweep;
+mod tangent;
 
 pub use bound::{Bound, StartValues};
 pub use emit::emit_tape;
 pub use model::{DerivativeForm, Model};
+pub use tangent::Tangent;
 
 /// Sampled inputs of an experiment as functions of time.
 pub trait InputSource: Sync {

@@ -1,0 +1,148 @@
+//! The derivative of a run in one direction of the parameters by dual numbers: an explicit model and its variation as one
+//! system of twice the size, along a recorded sequence of steps.
+
+use super::failure::Failure;
+use super::prepare::Record;
+use super::run::{Compiled, options, start};
+use crate::integrate::{self, Dynamics, Options, Plan, Start};
+use crate::linear::SparsityPattern;
+use crate::tape::{Bound, Tangent};
+use std::sync::Arc;
+
+/// Share of the direction for differences of the start values, and weights at one, two and three shares.
+const DISTANCE: f64 = 1e-4;
+const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
+
+/// Derivative of the record's channels along `direction`, the steps of `plan` held. The model must have explicit rates.
+///
+/// # Errors
+/// [`Failure`] of the start or of a step.
+pub(super) fn tangent(
+    compiled: &Compiled,
+    record: &Record,
+    theta: &[f64],
+    direction: &[f64],
+    plan: Arc<Plan>,
+) -> Result<Vec<Vec<f64>>, Failure> {
+    let blame = |bound: &Bound, failure: integrate::Failure| {
+        let n = compiled.model.dimension();
+        let name = |i: usize| compiled.model.variables()[i % n].name.clone();
+        Failure::from_integration(&record.name, &failure, name, |i| bound.equation_name(i % n))
+    };
+    let mut bound = Bound::new(&compiled.model, &record.inputs, theta);
+    let start = doubled_start(compiled, record, theta, direction).map_err(|failure| blame(&bound, failure))?;
+    let variation = bound.tangent(direction);
+    let mut doubled = Doubled::new(&mut bound, variation);
+    let options = Options { follow_plan: Some(plan), ..options(&compiled.study) };
+    let outcome = integrate::integrate(&mut doubled, &start, &record.times, &record.breakpoints, &options);
+    let solution = outcome.map_err(|failure| blame(doubled.bound, failure))?;
+    let Doubled { bound, mut variation, .. } = doubled;
+    let n = compiled.model.dimension();
+    let mut slopes = vec![0.0; compiled.model.output_count()];
+    let mut channels = vec![Vec::with_capacity(record.sample_count()); record.measures.len()];
+    for row in record.first..record.times.len() {
+        let (y, s) = solution.y[2 * n * row..2 * n * (row + 1)].split_at(n);
+        bound.outputs_tangent(&mut variation, solution.times[row], (y, s), &mut slopes);
+        channels.iter_mut().zip(&record.measures).for_each(|(channel, &measure)| channel.push(slopes[measure]));
+    }
+    Ok(channels)
+}
+
+/// Start values, and their derivative by differences.
+fn doubled_start(
+    compiled: &Compiled,
+    record: &Record,
+    theta: &[f64],
+    direction: &[f64],
+) -> Result<Start, integrate::Failure> {
+    let at = |share: f64| {
+        let moved: Vec<f64> = theta.iter().zip(direction).map(|(t, d)| t + share * d).collect();
+        start(compiled, &mut Bound::new(&compiled.model, &record.inputs, &moved), record, false)
+    };
+    let nominal = at(0.0)?;
+    let mut slopes = vec![0.0; nominal.y.len()];
+    for (k, weight) in WEIGHTS.iter().enumerate() {
+        for sign in [1.0, -1.0] {
+            let moved = at(sign * (k + 1) as f64 * DISTANCE)?;
+            slopes.iter_mut().zip(&moved.y).for_each(|(s, y)| *s += sign * weight * y / DISTANCE);
+        }
+    }
+    let y = [nominal.y, slopes].concat();
+    Ok(Start { time: nominal.time, y_prime: vec![0.0; y.len()], y, sensitivity: Vec::new() })
+}
+
+/// `y' = f`, `s' = f_y s + f_theta d`.
+struct Doubled<'b, 'm> {
+    bound: &'b mut Bound<'m>,
+    variation: Tangent,
+    scale: Vec<f64>,
+    differential: Vec<bool>,
+    pattern: SparsityPattern,
+    half: Vec<f64>,
+}
+
+impl<'b, 'm> Doubled<'b, 'm> {
+    fn new(bound: &'b mut Bound<'m>, variation: Tangent) -> Self {
+        let n = bound.dimension();
+        let entries: Vec<(usize, usize)> = bound.pattern().entries().collect();
+        let both: Vec<(usize, usize)> =
+            entries.iter().copied().chain(entries.iter().map(|(row, column)| (row + n, column + n))).collect();
+        Self {
+            scale: bound.scale().repeat(2),
+            differential: vec![true; 2 * n],
+            pattern: SparsityPattern::from_entries(2 * n, 2 * n, &both),
+            half: vec![0.0; entries.len()],
+            variation,
+            bound,
+        }
+    }
+
+    fn rates(&mut self, t: f64, y: &[f64], rates: &mut [f64]) {
+        let n = self.bound.dimension();
+        let (values, slopes) = rates.split_at_mut(n);
+        self.bound.rates_tangent(&mut self.variation, t, y.split_at(n), (values, slopes));
+    }
+}
+
+impl Dynamics for Doubled<'_, '_> {
+    fn dimension(&self) -> usize {
+        self.scale.len()
+    }
+
+    fn parameter_count(&self) -> usize {
+        0
+    }
+
+    fn differential(&self) -> &[bool] {
+        &self.differential
+    }
+
+    fn scale(&self) -> &[f64] {
+        &self.scale
+    }
+
+    fn residual(&mut self, t: f64, y: &[f64], y_prime: &[f64], residual: &mut [f64]) {
+        self.rates(t, y, residual);
+        residual.iter_mut().zip(y_prime).for_each(|(r, derivative)| *r = derivative - *r);
+    }
+
+    fn pattern(&self) -> &SparsityPattern {
+        &self.pattern
+    }
+
+    /// Without the effect of y on s': Newton's method finds s once it has y, as s enters linearly.
+    fn jacobian(&mut self, t: f64, y: &[f64], y_prime: &[f64], c: f64, values: &mut [f64]) {
+        let n = self.bound.dimension();
+        self.bound.jacobian(t, &y[..n], &y_prime[..n], c, &mut self.half);
+        let (first, second) = values.split_at_mut(self.half.len());
+        first.copy_from_slice(&self.half);
+        second.copy_from_slice(&self.half);
+    }
+
+    fn parameter_derivative(&mut self, _t: f64, _y: &[f64], _y_prime: &[f64], _values: &mut [f64]) {}
+
+    fn explicit_rates(&mut self, t: f64, y: &[f64], rates: &mut [f64]) -> bool {
+        self.rates(t, y, rates);
+        true
+    }
+}
