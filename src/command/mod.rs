@@ -13,6 +13,7 @@ mod format;
 mod new;
 mod output;
 mod progress;
+mod results;
 mod session;
 mod simulate;
 mod validate;

@@ -1,6 +1,6 @@
 //! `ident validate STUDY`
 
-use super::fit::fit_variant;
+use super::fit::{SearchArguments, fit_variant};
 use super::output::write_whole;
 use super::session::Session;
 use super::{Failed, Format, StudyArguments};
@@ -13,6 +13,8 @@ use std::path::PathBuf;
 pub(super) struct Arguments {
     #[command(flatten)]
     study: StudyArguments,
+    #[command(flatten)]
+    search: SearchArguments,
     /// Parameter vectors drawn for the Monte Carlo interval
     #[arg(long, default_value_t = 400)]
     samples: usize,
@@ -35,7 +37,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
         );
         return Err(Failed);
     }
-    let fit = fit_variant(&session, study, &study.variant)?;
+    let fit = fit_variant(&session, study, &study.variant, &arguments.search)?;
     let confidence = confidence(&fit.compiled, &fit.fitted);
     let options = MonteCarlo { samples: arguments.samples, seed: arguments.seed };
     let result = validity(&fit.compiled, &fit.fitted, &confidence, options);

@@ -9,12 +9,14 @@ pub struct PriorRow {
     /// (index of the parameter, weight)
     pub weights: Vec<(usize, f64)>,
     pub target: f64,
+    /// Taken from the linearisation of another result, whose undetermined directions turn with the parameters.
+    pub linearised: bool,
 }
 
 impl PriorRow {
     /// A normal prior of parameter `index`.
     pub fn gaussian(index: usize, mean: f64, standard_deviation: f64) -> Self {
-        Self { weights: vec![(index, 1.0 / standard_deviation)], target: mean / standard_deviation }
+        Self { weights: vec![(index, 1.0 / standard_deviation)], target: mean / standard_deviation, linearised: false }
     }
 
     pub fn residual(&self, theta: &[f64]) -> f64 {

@@ -1,6 +1,7 @@
 //! Covariance of the estimate from its gradient and the autocorrelation of its residual (method 7).
 
 use super::fitting::Fitted;
+use super::knowledge::straightened;
 use super::noise;
 use crate::signal::effective_count;
 use crate::simulation::Compiled;
@@ -11,7 +12,7 @@ use crate::study::Parameter;
 const LEVEL: f64 = 0.95;
 /// Singular values below this share of the largest belong to directions that the data do not determine. The gradient is
 /// accurate to about the integrator's tolerance, so smaller values are not distinguishable from zero.
-const RANK_THRESHOLD: f64 = 1e-6;
+pub(super) const RANK_THRESHOLD: f64 = 1e-6;
 
 /// What is known about the parameters after a fit.
 #[derive(Clone, Debug, Default)]
@@ -77,7 +78,7 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     }
     let scales: Vec<f64> = parameters.iter().map(Parameter::scale).collect();
     let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-    let gradient = gradient_with_priors(fitted);
+    let gradient = gradient_with_priors(fitted, &scales);
     let models = noise::models(fitted);
     confidence.noise_orders = models.iter().map(noise::NoiseModel::order).collect();
     confidence.noise = noise::deviations(compiled, fitted, &gradient, &scales, RANK_THRESHOLD);
@@ -98,12 +99,11 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
 }
 
 /// The gradient with prior knowledge as further rows, so that it determines what the data leave open.
-fn gradient_with_priors(fitted: &Fitted) -> Vec<f64> {
+fn gradient_with_priors(fitted: &Fitted, scales: &[f64]) -> Vec<f64> {
     let rows = fitted.residual.len().max(1);
+    let priors = straightened(&fitted.prior_rows, &fitted.theta, &fitted.gradient, scales);
     let columns = fitted.gradient.chunks_exact(rows).enumerate();
-    columns
-        .flat_map(|(j, column)| column.iter().copied().chain(fitted.prior_rows.iter().map(move |row| row.slope(j))))
-        .collect()
+    columns.flat_map(|(j, column)| column.iter().copied().chain(priors.iter().map(move |row| row.slope(j)))).collect()
 }
 
 /// `sum over channels n_eff log(RSS / n) + p log(sum n_eff)`.

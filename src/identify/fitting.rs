@@ -1,5 +1,6 @@
 //! The fit of one compiled study to its estimation records.
 
+use super::knowledge::straightened;
 use super::problem::{Block, Problem};
 use super::weights::{Weighting, first_weights, residual_deviations};
 use crate::diagnostics::{Code, Diagnostic};
@@ -10,7 +11,7 @@ use crate::fit::{
 };
 use crate::signal::Prefilter;
 use crate::simulation::{Compiled, Record};
-use crate::study::Study;
+use crate::study::{Parameter, Study};
 use rayon::prelude::*;
 
 /// How often weights are taken from the residual and the fit repeated (method 3.20, IV.6).
@@ -99,7 +100,18 @@ pub fn fit(
     let gains: Vec<f64> = filters.iter().map(Prefilter::noise_gain).collect();
     let mut start = settings.start.clone().unwrap_or_else(|| start_values(compiled));
     let mut problem = Problem::new(compiled, records.to_vec(), filters, weighting.weights.clone());
-    let rows = prior_rows(compiled, settings);
+    let mut rows = prior_rows(&compiled.study);
+    if !settings.knowledge.is_empty() {
+        // The data alone first: where they leave a direction open, another result's linearisation must not close it.
+        problem.weights.clone_from(&weighting.weights);
+        let (alone, _) = minimise(compiled, &mut problem, &start, settings, &rows, 0, observer)?;
+        let (count, all) = (problem.residual_count(), alone.residual.len());
+        let gradient: Vec<f64> =
+            alone.gradient.chunks_exact(all).flat_map(|column| &column[..count]).copied().collect();
+        let scales: Vec<f64> = compiled.study.parameters.iter().map(Parameter::scale).collect();
+        rows.extend(straightened(&settings.knowledge, &alone.theta, &gradient, &scales));
+        start.clone_from(&alone.theta);
+    }
     let mut start_costs = Vec::new();
     let mut iterations = 0;
     let mut history = Vec::new();
@@ -134,12 +146,12 @@ fn start_values(compiled: &Compiled) -> Vec<f64> {
     compiled.study.parameters.iter().map(|parameter| parameter.start).collect()
 }
 
-/// Priors of the study, and what independent results know.
-fn prior_rows(compiled: &Compiled, settings: &Settings) -> Vec<PriorRow> {
-    let parameters = compiled.study.parameters.iter().enumerate();
+/// Priors of the study.
+fn prior_rows(study: &Study) -> Vec<PriorRow> {
+    let parameters = study.parameters.iter().enumerate();
     let own = parameters
         .filter_map(|(index, p)| p.prior.map(|prior| PriorRow::gaussian(index, prior.mean, prior.standard_deviation)));
-    own.chain(settings.knowledge.iter().cloned()).collect()
+    own.collect()
 }
 
 /// The study's constraints as functions of the parameters.
@@ -173,13 +185,16 @@ impl Constraints for StudyConstraints {
     }
 }
 
-/// Texts of the study's constraints that hold with equality at `theta`, to a millionth of their change over the bounds.
+/// Share of its change over the bounds within which a constraint counts as active.
+const ACTIVE: f64 = 1e-5;
+
+/// Texts of the study's constraints that hold with equality at `theta`.
 pub fn active_constraints<'a>(study: &'a Study, theta: &[f64]) -> Vec<&'a str> {
     let (values, gradients) = StudyConstraints::new(study).evaluate(theta);
     let change = |gradient: &[f64]| {
         gradient.iter().zip(&study.parameters).map(|(slope, p)| (slope * p.scale()).powi(2)).sum::<f64>().sqrt()
     };
-    let active = |k: usize| values[k] >= -1e-6 * change(&gradients[k]);
+    let active = |k: usize| values[k] >= -ACTIVE * change(&gradients[k]);
     study.constraints.iter().enumerate().filter(|(k, _)| active(*k)).map(|(_, c)| c.text.as_str()).collect()
 }
 

@@ -6,10 +6,12 @@
 
 mod confidence;
 mod fitting;
+mod knowledge;
 mod noise;
 mod problem;
 mod report;
 mod result;
+mod saved;
 mod weights;
 
 pub use confidence::{Confidence, confidence};
@@ -17,4 +19,5 @@ pub use fitting::{Fitted, Settings, active_constraints, fit, prefilters};
 pub use problem::{Block, Problem};
 pub use report::identification;
 pub use result::*;
+pub use saved::{RESULT, SavedParameter, SavedResult};
 pub use weights::Weighting;

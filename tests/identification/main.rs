@@ -1,5 +1,7 @@
 //! Identification with honest statistics, on the shipped studies.
 
+mod combination;
 mod coverage;
+mod nuisance;
 mod shipped;
 mod validity;
