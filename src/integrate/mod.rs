@@ -10,6 +10,7 @@ mod bdf_history;
 mod choice;
 mod consistent;
 mod equilibrium;
+mod events;
 mod newton;
 mod norm;
 mod problem;
@@ -31,7 +32,8 @@ use run::Run;
 ///
 /// `breakpoints` are times at which the right-hand side may jump (steps of an input): a step ends exactly there and the
 /// method starts anew. Right-hand sides are taken as continuous from the right; up to a breakpoint they are evaluated
-/// just before it. Requested times do not shorten steps. Sensitivities are computed where `start.sensitivity` is given,
+/// just before it. At the zeros of switching functions the state is reset and the method starts anew likewise; a
+/// requested time that coincides with an event gets the values before it. Requested times do not shorten steps. Sensitivities are computed where `start.sensitivity` is given,
 /// as exact derivatives of the discrete solution for the steps taken.
 ///
 /// # Errors
@@ -97,7 +99,8 @@ fn check<D: Dynamics + ?Sized>(dynamics: &D, start: &Start, times: &[f64], optio
         && options.initial_step.is_none_or(|h| h > 0.0)
         && options.maximum_step.is_none_or(|h| h > 0.0)
         && positive(dynamics.parameter_scale()).is_none();
-    if !(lengths && order && tolerances) {
+    let can_follow = options.follow_plan.is_none() || dynamics.switch_count() == 0;
+    if !(lengths && order && tolerances && can_follow) {
         return Err(invalid(start.time, None));
     }
     match start.y.iter().position(|v| !v.is_finite()) {

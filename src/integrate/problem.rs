@@ -76,6 +76,32 @@ pub trait Dynamics {
         true
     }
 
+    /// Number of switching functions: as long as none changes its sign, the right-hand side is smooth.
+    fn switch_count(&self) -> usize {
+        0
+    }
+
+    /// Values of the switching functions; in modes in which one has no meaning it keeps a constant sign.
+    fn switches(&mut self, _t: f64, _y: &[f64], _values: &mut [f64]) {}
+
+    /// Derivatives of switching function `k`; zero on entry.
+    fn switch_derivatives(&mut self, _k: usize, _t: f64, _y: &[f64], _derivatives: &mut SwitchDerivatives) {}
+
+    /// Derivatives of the reset that a zero of function `k` brings; those of no reset on entry. `y` and the mode are
+    /// those before it.
+    fn reset_derivatives(
+        &mut self,
+        _k: usize,
+        _rising: bool,
+        _t: f64,
+        _y: &[f64],
+        _derivatives: &mut ResetDerivatives,
+    ) {
+    }
+
+    /// At a zero of function `k`: changes the mode of the equations, and the state where it jumps.
+    fn reset(&mut self, _k: usize, _rising: bool, _t: f64, _y: &mut [f64]) {}
+
     /// Name of component `i` in the study's words, for messages.
     fn component_name(&self, i: usize) -> String {
         format!("y[{i}]")
@@ -84,6 +110,41 @@ pub trait Dynamics {
     /// Name of equation (row of F) `i` in the study's words, for messages: of a constraint, the loop it closes.
     fn equation_name(&self, i: usize) -> String {
         format!("equation of {}", self.component_name(i))
+    }
+}
+
+/// Derivatives of a switching function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SwitchDerivatives {
+    pub by_time: f64,
+    /// Length n.
+    pub by_state: Vec<f64>,
+    /// Length p (0 in a nominal run).
+    pub by_parameter: Vec<f64>,
+}
+
+impl SwitchDerivatives {
+    pub fn zero(n: usize, p: usize) -> Self {
+        Self { by_time: 0.0, by_state: vec![0.0; n], by_parameter: vec![0.0; p] }
+    }
+}
+
+/// Derivatives of the state after a reset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResetDerivatives {
+    /// Length n.
+    pub by_time: Vec<f64>,
+    /// With respect to the state before, n x n column-major.
+    pub by_state: Vec<f64>,
+    /// n x p column-major (p = 0 in a nominal run).
+    pub by_parameter: Vec<f64>,
+}
+
+impl ResetDerivatives {
+    /// Of no reset.
+    pub fn identity(n: usize, p: usize) -> Self {
+        let by_state = (0..n * n).map(|k| if k % (n + 1) == 0 { 1.0 } else { 0.0 }).collect();
+        Self { by_time: vec![0.0; n], by_state, by_parameter: vec![0.0; n * p] }
     }
 }
 
@@ -103,7 +164,8 @@ pub struct Options {
     /// Keep the sequence of steps in [`Solution::plan`].
     pub record_plan: bool,
     /// Follow this sequence of steps instead of controlling the error: the solution becomes a smooth function of the
-    /// parameters, whose derivative the sensitivities of the recorded run are (internal differentiation).
+    /// parameters, whose derivative the sensitivities of the recorded run are (internal differentiation). Impossible for
+    /// systems with switching functions, whose events move with the parameters.
     pub follow_plan: Option<std::sync::Arc<Plan>>,
 }
 
@@ -176,6 +238,8 @@ pub struct Work {
     pub method: &'static str,
     /// Why this method.
     pub reason: String,
+    /// Times of events and the switching functions that caused them.
+    pub events: Vec<(f64, usize)>,
     /// Changes of method: time and the method from there on.
     pub switches: Vec<(f64, &'static str)>,
     pub steps: usize,
@@ -241,7 +305,9 @@ pub enum FailureCause {
     NoEquilibrium,
     /// The implicit equations of a step could not be solved however small the step.
     NoConvergence,
+    /// Events follow each other without end.
+    Chattering,
     /// Times not ascending or before the start, wrong lengths, tolerances or scales not positive, or an explicit method
-    /// forced on a system without explicit rates.
+    /// forced on a system without explicit rates, or a plan on one with switching functions.
     InvalidRequest,
 }

@@ -4,6 +4,7 @@ use super::augmented::Augmented;
 use super::bdf::Bdf;
 use super::choice::{Advice, Monitor};
 use super::consistent::{Consistency, make_consistent};
+use super::events::Events;
 use super::norm::ErrorNorm;
 use super::problem::{Dynamics, FailureCause, MethodChoice, Options, Plan, Start};
 use super::recorder::Recorder;
@@ -40,7 +41,10 @@ pub(super) struct Run<'d, 't, D: ?Sized> {
     runge_kutta: RungeKutta,
     bdf: Bdf,
     monitor: Option<Monitor>,
+    events: Option<Events>,
     has_passed_start: bool,
+    /// The present state is in `z`, not in the method.
+    has_settled: bool,
     tolerance: f64,
     time: f64,
     z: Vec<f64>,
@@ -63,6 +67,8 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
         system.work.method = method.name();
         system.work.reason = reason.to_owned();
         system.work.span = (start.time, times.last().copied().unwrap_or(start.time));
+        let switches = system.dynamics.switch_count();
+        let events = (switches > 0).then(|| Events::new(switches, z.len()));
         let automatic = method == Method::Explicit && options.method == MethodChoice::Automatic;
         Self {
             recorder: Recorder::new(n, p, times, options.record_plan),
@@ -72,7 +78,9 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
             bdf: Bdf::new(&system, norm(&system)),
             monitor: (automatic && options.follow_plan.is_none()).then(Monitor::default),
             system,
+            events,
             has_passed_start: false,
+            has_settled: false,
             tolerance: options.relative_tolerance,
             time: start.time,
             z,
@@ -127,7 +135,7 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
     }
 
     fn make_consistent(&mut self, end: f64) -> Result<(), Refusal> {
-        let time_step = TIME_SHARE * (end - self.time).max(f64::MIN_POSITIVE.sqrt());
+        let time_step = time_step(self.time, end);
         match make_consistent(&mut self.system, self.time, time_step, &mut self.z, &mut self.z_prime) {
             Consistency::NotFinite(component) => {
                 Err(Refusal { component: Some(component), ..Refusal::new(self.time, FailureCause::NotFinite) })
@@ -145,8 +153,10 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
                 Method::Bdf => self.bdf.step(&mut self.system, &self.limits, end)?,
             };
             self.recorder.note(step);
-            self.take_step();
-            self.heed_monitor(end)?;
+            if !self.heed_events(end)? {
+                self.take_step();
+                self.heed_monitor(end)?;
+            }
         }
         self.end_segment();
         Ok(())
@@ -183,11 +193,21 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
             self.make_consistent(end)?;
         }
         self.has_passed_start = true;
+        if let Some(events) = &mut self.events {
+            if self.method == Method::Explicit {
+                self.system.rates(self.time, &self.z, &mut self.z_prime);
+            }
+            let n = self.system.n;
+            events.begin(&mut self.system, self.time, &self.z, &self.z_prime[..n]);
+        }
         self.start_method(end)
     }
 
     fn end_segment(&mut self) {
-        self.keep_solution();
+        // After an event at the very end the state is that after its reset.
+        if !std::mem::take(&mut self.has_settled) {
+            self.keep_solution();
+        }
     }
 
     fn start_method(&mut self, end: f64) -> Result<(), Refusal> {
@@ -212,15 +232,54 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
     }
 
     fn take_step(&mut self) {
+        self.time = self.step_end();
+        self.take_interpolated();
+    }
+
+    fn take_interpolated(&mut self) {
         match self.method {
-            Method::Explicit => {
-                self.time = self.runge_kutta.time();
-                self.recorder.take_until(self.time, |t, z| self.runge_kutta.interpolate(t, z));
+            Method::Explicit => self.recorder.take_until(self.time, |t, z| self.runge_kutta.interpolate(t, z)),
+            Method::Bdf => self.recorder.take_until(self.time, |t, z| self.bdf.interpolate(t, z)),
+        }
+    }
+
+    /// Whether the step just taken ended in an event; the solution then goes on from there.
+    fn heed_events(&mut self, end: f64) -> Result<bool, Refusal> {
+        let to = self.step_end();
+        let Some(events) = &mut self.events else { return Ok(false) };
+        let system = &mut self.system;
+        let found = match self.method {
+            Method::Explicit => events.find(system, self.time, to, |t, z| self.runge_kutta.interpolate(t, z)),
+            Method::Bdf => events.find(system, self.time, to, |t, z| self.bdf.interpolate(t, z)),
+        };
+        let Some(event) = found else { return Ok(false) };
+        self.time = event.time;
+        self.take_interpolated();
+        match self.method {
+            Method::Explicit => self.runge_kutta.interpolate(event.time, &mut self.z),
+            Method::Bdf => self.bdf.interpolate(event.time, &mut self.z),
+        }
+        let time_step = time_step(event.time, end);
+        if let Some(events) = &mut self.events {
+            events.cross(&mut self.system, event, time_step, &mut self.z)?;
+        }
+        self.system.work.events.push((event.time, event.switch));
+        self.has_settled = true;
+        if self.time < end {
+            if self.method == Method::Bdf {
+                self.make_consistent(end)?;
             }
-            Method::Bdf => {
-                self.time = self.bdf.time();
-                self.recorder.take_until(self.time, |t, z| self.bdf.interpolate(t, z));
-            }
+            self.start_method(end)?;
+            self.has_settled = false;
+        }
+        Ok(true)
+    }
+
+    /// Where the method in charge has got to.
+    fn step_end(&self) -> f64 {
+        match self.method {
+            Method::Explicit => self.runge_kutta.time(),
+            Method::Bdf => self.bdf.time(),
         }
     }
 
@@ -250,6 +309,11 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
         }
         self.start_method(end)
     }
+}
+
+/// Distance of differences in time.
+fn time_step(time: f64, end: f64) -> f64 {
+    TIME_SHARE * (end - time).max(f64::MIN_POSITIVE.sqrt())
 }
 
 fn first_method(explicit: bool, choice: MethodChoice) -> (Method, &'static str) {

@@ -61,6 +61,10 @@ impl Failure {
                 "the number of steps exceeded its limit",
                 "the model is much faster than the record; check stiffnesses and masses, or loosen `solver { tolerance = .. }`",
             ),
+            Cause::Chattering => (
+                "a law switches without end",
+                "it switches to and fro at one instant or ever faster; make it smooth, or give it a hysteresis",
+            ),
             Cause::NotFinite => (
                 "the solution became infinite or not a number",
                 "the model is unstable with these parameters (wrong sign, missing damping, division by zero); narrow the bounds",

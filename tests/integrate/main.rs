@@ -1,6 +1,7 @@
 //! The integrators against analytic solutions and published references.
 
 mod equilibrium;
+mod events;
 mod failures;
 mod loops;
 mod mechanisms;

@@ -1,0 +1,246 @@
+//! Switching functions: their zeros are located on the interpolant of a step, the state is reset there, and the
+//! sensitivities are carried across.
+//!
+//! With `g(tau, y(tau; theta), theta) = 0` at the instant tau and the reset `y+ = R(tau, y-, theta)`:
+//! `dtau/dtheta = -(g_y S- + g_theta) / (g_t + g_y y'-)` and
+//! `S+ = R_y (S- + y'- dtau/dtheta) + R_theta + (R_t - y'+) dtau/dtheta` (Rozenvasser-1967).
+
+use super::augmented::Augmented;
+use super::consistent::{Consistency, make_consistent};
+use super::problem::{Dynamics, FailureCause, ResetDerivatives, SwitchDerivatives};
+use super::stepper::{Refusal, first_not_finite};
+
+/// Points within a step at which signs are compared, besides its end.
+const INNER_POINTS: usize = 3;
+const MAXIMUM_ITERATIONS: usize = 100;
+/// A value this small against that at the begin of the step is zero: its sign is that of its slope.
+const ZERO: f64 = 1e-6;
+/// Events of one switching function within this share of the run after each other ...
+const TOGETHER: f64 = 1e-9;
+/// ... may be this many.
+const MOST_TOGETHER: usize = 5;
+
+/// An instant at which a switching function changes its sign.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Event {
+    pub time: f64,
+    pub switch: usize,
+}
+
+pub(super) struct Events {
+    /// Signs of the switching functions, and their values at the begin of the step.
+    signs: Vec<f64>,
+    at_begin: Vec<f64>,
+    values: Vec<f64>,
+    z: Vec<f64>,
+    /// Per switching function: its last event, and how many came shortly after each other.
+    last: Vec<f64>,
+    together: Vec<usize>,
+}
+
+impl Events {
+    pub fn new(count: usize, length: usize) -> Self {
+        let empty = || vec![0.0; count];
+        let (signs, at_begin, values) = (empty(), empty(), empty());
+        Self {
+            signs,
+            at_begin,
+            values,
+            z: vec![0.0; length],
+            last: vec![f64::NEG_INFINITY; count],
+            together: vec![0; count],
+        }
+    }
+
+    /// Takes the signs at a start; those of zeros from their slopes.
+    pub fn begin<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, t: f64, z: &[f64], y_prime: &[f64]) {
+        system.dynamics.switches(t, &z[..system.n], &mut self.values);
+        for k in 0..self.values.len() {
+            let zero = self.values[k] == 0.0;
+            let value = if zero { derivatives(system, k, t, z).along(y_prime) } else { self.values[k] };
+            self.signs[k] = sign(value);
+        }
+        self.at_begin.copy_from_slice(&self.values);
+    }
+
+    /// The first event in the step from `from` to `to`.
+    pub fn find<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &mut Augmented<D>,
+        from: f64,
+        to: f64,
+        interpolate: impl Fn(f64, &mut [f64]),
+    ) -> Option<Event> {
+        let mut left = from;
+        for point in 1..=INNER_POINTS + 1 {
+            let right = if point > INNER_POINTS { to } else { from + (to - from) * point as f64 / 4.0 };
+            interpolate(right, &mut self.z);
+            system.dynamics.switches(right, &self.z[..system.n], &mut self.values);
+            let crossed: Vec<usize> =
+                (0..self.values.len()).filter(|&k| sign(self.values[k]) * self.signs[k] < 0.0).collect();
+            let events = crossed.into_iter().map(|switch| {
+                let time = self.locate(system, switch, left, right, &interpolate);
+                Event { time, switch }
+            });
+            if let Some(first) = events.min_by(|a, b| a.time.total_cmp(&b.time)) {
+                return Some(first);
+            }
+            left = right;
+        }
+        self.at_begin.copy_from_slice(&self.values);
+        // A function that started at zero without a slope has its sign from now on.
+        for (sign_of, value) in self.signs.iter_mut().zip(&self.values) {
+            if *sign_of == 0.0 {
+                *sign_of = sign(*value);
+            }
+        }
+        None
+    }
+
+    /// First instant known to lie behind the zero between `left` and `right`, to rounding; bisection and false position in
+    /// turn, so that neither flat nor steep functions are slow.
+    fn locate<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &mut Augmented<D>,
+        switch: usize,
+        mut left: f64,
+        mut right: f64,
+        interpolate: impl Fn(f64, &mut [f64]),
+    ) -> f64 {
+        let mut values = vec![0.0; self.values.len()];
+        let mut value = |t: f64, z: &mut [f64]| {
+            interpolate(t, z);
+            system.dynamics.switches(t, &z[..system.n], &mut values);
+            values[switch]
+        };
+        let (mut at_left, mut at_right) = (value(left, &mut self.z), value(right, &mut self.z));
+        for iteration in 0..MAXIMUM_ITERATIONS {
+            if right - left <= 2.0 * f64::EPSILON * right.abs().max(left.abs()) {
+                break;
+            }
+            let share = if iteration % 3 == 2 { 0.5 } else { at_left / (at_left - at_right) };
+            let middle = left + (right - left) * if share.is_finite() { share.clamp(1e-3, 1.0 - 1e-3) } else { 0.5 };
+            if middle <= left || middle >= right {
+                break;
+            }
+            let at_middle = value(middle, &mut self.z);
+            if sign(at_middle) * self.signs[switch] < 0.0 {
+                (right, at_right) = (middle, at_middle);
+            } else {
+                (left, at_left) = (middle, at_middle);
+            }
+        }
+        right
+    }
+
+    /// Resets state and sensitivities (`z` holds them just before the event) and takes the new signs.
+    pub fn cross<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &mut Augmented<D>,
+        event: Event,
+        time_step: f64,
+        z: &mut [f64],
+    ) -> Result<(), Refusal> {
+        let Event { time, switch } = event;
+        self.refuse_accumulation(system, event)?;
+        let n = system.n;
+        let rising = self.signs[switch] < 0.0;
+        let before = slopes(system, time, time_step, z)?;
+        let condition = derivatives(system, switch, time, z);
+        let mut reset = ResetDerivatives::identity(n, system.p);
+        system.dynamics.reset_derivatives(switch, rising, time, &z[..n], &mut reset);
+        let at_begin = self.at_begin[switch];
+        system.dynamics.reset(switch, rising, time, &mut z[..n]);
+        let after = slopes(system, time, time_step, z)?;
+        if system.p > 0 {
+            carry_across(z, n, system.p, (&before, &after), &condition, &reset);
+            if let Some(place) = first_not_finite(&z[n..]) {
+                return Err(Refusal::new(time, FailureCause::NotFinite).blaming(Some(place / system.p)));
+            }
+        }
+        self.begin(system, time, z, &after);
+        if self.values[switch].abs() <= ZERO * at_begin.abs() {
+            let slope = derivatives(system, switch, time, z).along(&after);
+            let crossed = if rising { 1.0 } else { -1.0 };
+            self.signs[switch] = if slope == 0.0 { crossed } else { sign(slope) };
+        }
+        Ok(())
+    }
+
+    /// Events without end in a finite time (a ball that comes to rest by bouncing).
+    fn refuse_accumulation<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &Augmented<D>,
+        Event { time, switch }: Event,
+    ) -> Result<(), Refusal> {
+        let (begin, end) = system.work.span;
+        let is_close = time - self.last[switch] <= TOGETHER * (end - begin);
+        self.together[switch] = if is_close { self.together[switch] + 1 } else { 0 };
+        self.last[switch] = time;
+        if self.together[switch] > MOST_TOGETHER {
+            return Err(Refusal::new(time, FailureCause::Chattering));
+        }
+        Ok(())
+    }
+}
+
+fn sign(value: f64) -> f64 {
+    if value > 0.0 {
+        1.0
+    } else if value < 0.0 {
+        -1.0
+    } else {
+        0.0
+    }
+}
+
+fn derivatives<D: Dynamics + ?Sized>(system: &mut Augmented<D>, switch: usize, t: f64, z: &[f64]) -> SwitchDerivatives {
+    let mut result = SwitchDerivatives::zero(system.n, system.p);
+    system.dynamics.switch_derivatives(switch, t, &z[..system.n], &mut result);
+    result
+}
+
+impl SwitchDerivatives {
+    /// Rate of the function along a solution with the derivative `y_prime`.
+    fn along(&self, y_prime: &[f64]) -> f64 {
+        self.by_time + self.by_state.iter().zip(y_prime).map(|(g, v)| g * v).sum::<f64>()
+    }
+}
+
+/// Derivative of the state at a point, by the equations in force.
+fn slopes<D: Dynamics + ?Sized>(
+    system: &mut Augmented<D>,
+    t: f64,
+    time_step: f64,
+    z: &[f64],
+) -> Result<Vec<f64>, Refusal> {
+    let (mut z, mut z_prime) = (z.to_vec(), vec![0.0; z.len()]);
+    match make_consistent(system, t, time_step, &mut z, &mut z_prime) {
+        Consistency::NotFinite(component) => Err(Refusal::new(t, FailureCause::NotFinite).blaming(Some(component))),
+        Consistency::Reached | Consistency::Undetermined => {
+            z_prime.truncate(system.n);
+            Ok(z_prime)
+        }
+    }
+}
+
+fn carry_across(
+    z: &mut [f64],
+    n: usize,
+    p: usize,
+    (before, after): (&[f64], &[f64]),
+    condition: &SwitchDerivatives,
+    reset: &ResetDerivatives,
+) {
+    let rate = condition.along(before);
+    let s = &mut z[n..];
+    for j in 0..p {
+        let known: f64 = condition.by_state.iter().enumerate().map(|(i, g)| g * s[i * p + j]).sum();
+        let shift = -(known + condition.by_parameter[j]) / rate;
+        let moved: Vec<f64> = (0..n).map(|i| s[i * p + j] + before[i] * shift).collect();
+        for i in 0..n {
+            let carried: f64 = moved.iter().enumerate().map(|(l, m)| reset.by_state[l * n + i] * m).sum();
+            s[i * p + j] = carried + reset.by_parameter[j * n + i] + (reset.by_time[i] - after[i]) * shift;
+        }
+    }
+}
