@@ -13,11 +13,17 @@ pub struct Failure {
     pub cause: String,
     /// State to blame, e.g. `slide.velocity`.
     pub component: Option<String>,
+    pub detail: Box<Detail>,
+    pub help: String,
+}
+
+/// More about a failure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Detail {
     /// Equations that contradict or repeat each other.
     pub equations: Vec<String>,
     /// What the run had cost until then, and who limited its steps.
     pub slowness: Slowness,
-    pub help: String,
 }
 
 impl fmt::Display for Failure {
@@ -26,11 +32,11 @@ impl fmt::Display for Failure {
         if let Some(component) = &self.component {
             write!(formatter, ", limited by {component}")?;
         }
-        if !self.equations.is_empty() {
-            write!(formatter, ": {}", self.equations.join(", "))?;
+        if !self.detail.equations.is_empty() {
+            write!(formatter, ": {}", self.detail.equations.join(", "))?;
         }
-        if let Some(foremost) = self.slowness.foremost() {
-            write!(formatter, " (after {} steps; steps limited by {foremost})", self.slowness.steps)?;
+        if let Some(foremost) = self.detail.slowness.foremost() {
+            write!(formatter, " (after {} steps; steps limited by {foremost})", self.detail.slowness.steps)?;
         }
         Ok(())
     }
@@ -89,8 +95,10 @@ impl Failure {
             time: failure.time,
             cause: cause.to_owned(),
             component: failure.component.map(&name),
-            equations: failure.equations.iter().map(|&i| equation(i)).collect(),
-            slowness: Slowness::new(&failure.work, name),
+            detail: Box::new(Detail {
+                equations: failure.equations.iter().map(|&i| equation(i)).collect(),
+                slowness: Slowness::new(&failure.work, name),
+            }),
             help: help.to_owned(),
         }
     }

@@ -14,7 +14,7 @@ mod slowness;
 mod tangent;
 
 pub use certificate::certify;
-pub use failure::Failure;
+pub use failure::{Detail, Failure};
 pub use inputs::RecordInputs;
 pub use manoeuvre::manoeuvre;
 pub use prepare::{Record, prepare};

@@ -1,6 +1,6 @@
 //! One record simulated.
 
-use super::failure::Failure;
+use super::failure::{Detail, Failure};
 use super::prepare::Record;
 use super::slowness::Slowness;
 use crate::diagnostics::{Code, Diagnostic};
@@ -162,8 +162,7 @@ fn run(
             time: record.times.last().copied().unwrap_or(start.time),
             cause: "a measured quantity became infinite or not a number".to_owned(),
             component: None,
-            equations: Vec::new(),
-            slowness: Slowness::new(&solution.work, name),
+            detail: Box::new(Detail { equations: Vec::new(), slowness: Slowness::new(&solution.work, name) }),
             help: "a measure or criterion divides by zero or takes the root of a negative number".to_owned(),
         });
     }
