@@ -13,7 +13,6 @@ mod tables;
 
 use ident::diagnostics::{Code, render};
 use ident::study::{check, load_text};
-use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -58,17 +57,6 @@ fn errors_are_told_in_an_engineers_words() {
             .bind(|| insta::assert_snapshot!(name.trim_end_matches(".ident"), render(&shown, &loaded.sources, false)));
     }
     assert!(silent.is_empty(), "{}", silent.join("\n"));
-}
-
-/// Codes of E02 are those of this stage; of the mechanical ones these are found here already.
-#[test]
-fn every_code_of_the_stage_has_a_case() {
-    let shared = [Code::UNCONNECTED_BODY, Code::NO_INERTIA, Code::COINCIDENT_POINTS, Code::ACCELERATION_IN_LOAD];
-    let own = Code::ALL.iter().filter(|code| code.text.starts_with("E02"));
-    let wanted: BTreeSet<&str> = own.chain(&shared).map(|code| code.text).collect();
-    let names: Vec<String> = cases().iter().map(|path| name_of(path)).collect();
-    let found: BTreeSet<&str> = names.iter().filter_map(|name| name.split('_').next()).collect();
-    assert_eq!(found, wanted);
 }
 
 #[test]

@@ -20,10 +20,7 @@ impl Session {
         let diagnostics = session.loaded.diagnostics.clone();
         if diagnostics.iter().any(Diagnostic::is_error) {
             // Checking goes on where it can, so that all errors come in one go.
-            let mut all = diagnostics;
-            if let Err(more) = study::check(&session.loaded, None) {
-                all.extend(more);
-            }
+            let all = study::check(&session.loaded, None).err().unwrap_or(diagnostics);
             return Err(session.fail(&all));
         }
         session.show(&diagnostics);

@@ -3,6 +3,7 @@
 use super::output::{json, show, write_whole};
 use super::session::Session;
 use super::{Failed, Format, StudyArguments};
+use crate::diagnostics::{Code, Diagnostic};
 use crate::simulation::{Compiled, Gradient, Record, Trajectory, manoeuvre, simulate, slowness};
 use std::path::PathBuf;
 
@@ -37,8 +38,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     let mut trajectories = Vec::new();
     for record in &records {
         let trajectory = simulate(&compiled, record, &theta, Gradient::None).map_err(|failure| {
-            eprintln!("error: {failure}\nhelp: {}", failure.help);
-            Failed
+            let diagnostic = Diagnostic::error(Code::SIMULATION_FAILED, failure.to_string()).help(&failure.help);
+            session.fail(&[diagnostic])
         })?;
         trajectories.push((record, trajectory));
     }

@@ -82,20 +82,26 @@ codes! {
 
     UNCLOSED "E0103" "missing closing brace"
     "A brace, parenthesis, bracket or quotation mark is opened but never closed. Reading goes on at the next\n\
-     declaration that starts at the beginning of a line.\n"
+     declaration that starts at the beginning of a line.\n\
+     Close it where it belongs; `ident fmt` then shows by the indentation what belongs together.\n"
 
     TOO_DEEP "E0104" "nested too deeply or too large"
     "Expressions and blocks may be nested up to a fixed depth, and files up to a fixed size; generated text that\n\
      exceeds it is refused instead of exhausting the memory. Split the expression with `let`, the file with `use`.\n"
 
     NOT_YET "E0105" "not yet part of the language"
-    "The construct is reserved: it is planned but this version does not read it.\n"
+    "The construct is reserved: it is planned but this version does not read it.\n\
+     Write what it stands for by hand, e.g. an `end_stop` for a contact.\n"
 
     BAD_NUMBER "E0106" "not a number"
     "Numbers are written like `12`, `0.5`, `1.2e-3`, followed by their unit: `12 kN/m`.\n"
 
     REPEATED_CLAUSE "E0107" "written twice"
     "A clause that may stand once is written twice, e.g. two `lowpass` designs in one filter.\n"
+
+    SPACED_UNIT "E0108" "unit with a blank"
+    "A unit is one word whose parts are joined by signs: `12 N*m`, not `12 N m`; `3 m/s^2`, not `3 m / s^2`. What follows a blank\n\
+     is arithmetic or another entry.\n"
 
     // ---- E02xx: names, quantities, dimensions, structure of the study ----
 
@@ -108,7 +114,9 @@ codes! {
      (`bar`, `rpm`, `deg`, `km/h`, `g0`), and products and powers of them: `kN*s/m`, `N*m/rad`, `m/s^2`.\n"
 
     DIMENSION_MISMATCH "E0203" "dimensions do not agree"
-    "Only quantities of the same dimension can be added, compared or assigned. Both places are marked.\n"
+    "Only quantities of the same dimension can be added, compared or assigned. Both places are marked.\n\
+     `3 kN + 2 mm` has no meaning. Where a factor is missing, write it: `force + stiffness * 2 mm`; where only the unit is missing,\n\
+     write it: `stiffness = 180 kN/m`.\n"
 
     DUPLICATE_NAME "E0204" "declared twice"
     "Every name is declared once, and every field given once. Everything that an expression can mention shares one\n\
@@ -128,15 +136,18 @@ codes! {
      `inertia` of a law on a joint). The note lists the fields there are.\n"
 
     MISSING_FIELD "E0208" "missing field"
-    "A port, parameter or field without default is not given. Nothing is assumed in its place.\n"
+    "A port, parameter or field without default is not given. Nothing is assumed in its place.\n\
+     Add the field, e.g. `stiffness = 180 kN/m`; the help names it.\n"
 
     WRONG_VALUE "E0209" "value of the wrong sort"
     "The value does not suit: a text where a number is needed, a word that is not one of the choices, a number outside\n\
-     of what makes sense (a negative mass, a standard deviation of zero).\n"
+     of what makes sense (a negative mass, a standard deviation of zero).\n\
+     The note lists the choices; `start = equilibrium`, `mass = 45 kg`.\n"
 
     NOT_CONSTANT "E0210" "not a constant"
     "Masses, positions and start values may depend on parameters but not on time or motion. Bounds, windows and edges\n\
-     of filters are plain numbers.\n"
+     of filters are plain numbers.\n\
+     Write the number with its unit, `window = 1 s .. 10 s`, or give the quantity a name in `identify`.\n"
 
     WRONG_PLACE "E0211" "law or effect at a wrong place"
     "Laws that give a force do not suit a revolute joint, an effect stands only on the kinds of places it declares, and\n\
@@ -144,10 +155,16 @@ codes! {
 
     FREQUENCY_UNIT "E0212" "frequency or angular velocity"
     "Frequencies count periods (Hz), angular velocities count angle (rad/s, rpm); both are 1/s but differ by 2 pi. A\n\
-     parameter declared as one of them does not take the unit of the other: 1 Hz = 6.283 rad/s.\n"
+     parameter declared as one of them does not take the unit of the other: 1 Hz = 6.283 rad/s.\n\
+     Write `frequency = 5 Hz`, `speed = 31.4 rad/s` or `speed = 300 rpm`.\n"
 
     WRONG_ARGUMENTS "E0213" "wrong number of arguments"
-    "The function takes another number of arguments.\n"
+    "The function takes another number of arguments.\n\
+     `max(a, b)` has two, `sqrt(a)` one; nest for more: `max(a, max(b, c))`.\n"
+
+    CONDITION "E0214" "condition expected"
+    "Between `if` and `then`, and on both sides of `and` and `or`, stands a comparison: `if x > 0 mm then ..`. Conditions are not\n\
+     chained: `0 mm < x and x < 5 mm` instead of `0 mm < x < 5 mm`.\n"
 
     NOT_A_VALUE "E0215" "not a value"
     "The name stands for a body, joint or element. Its quantities are values: `slide.position`, `tyre.force`,\n\
@@ -159,13 +176,32 @@ codes! {
 
     INVALID_DECLARATION "E0217" "law or effect declared wrongly"
     "A law or effect needs what diagnosis and checking rely on: types for amplitudes and shapes, a range for every shape,\n\
-     at least one amplitude and one action, ports that the places really have.\n"
+     at least one amplitude and one action, ports that the places really have.\n\
+     Write e.g. `amplitude F: load` and `shape creep: rate in 0.001 .. 0.1 of rate`.\n"
 
     OVERRIDES_PRELUDE "E0218" "replaces the prelude's"
-    "A law or effect of the study has the name of one that ships with the tool, and is used instead of it.\n"
+    "A law or effect of the study has the name of one that ships with the tool, and is used instead of it.\n\
+     Rename yours if both are wanted: `law my_spring(x: coordinate) -> load { .. }`.\n"
+
+    UNIT_AS_NAME "E0219" "unit without number"
+    "A unit follows its number on the same line: `3 kN/m`. Where a name is scaled by a unit, the unit has its own number:\n\
+     `factor * 1 kN/m`.\n"
+
+    EXPONENT "E0220" "exponent"
+    "An exponent is a plain number. Of a quantity with a dimension only powers with a proper dimension exist: `x^2`, `(x*y)^0.5`\n\
+     where it works out; else divide first by a reference: `(v / (1 m/s))^1.7`.\n"
+
+    PRODUCT "E0221" "product without sign"
+    "The word behind a number is its unit. A product has its sign: `2 * c_strut`, not `2 c_strut`.\n"
 
     SAME_BODY "E0222" "both ends on one body"
-    "A joint or force element acts between two different bodies (or a body and ground).\n"
+    "A joint or force element acts between two different bodies (or a body and ground).\n\
+     Name the other body: `force tyre: spring table -> wheel { .. }`.\n"
+
+    IMPOSSIBLE_INERTIA "E0223" "impossible inertia"
+    "Each principal moment of inertia of a body is at most the sum of the other two (equal for a flat plate). Moments that violate\n\
+     this have a wrong unit, a wrong order, or belong to another point than the centre of gravity.\n\
+     \n    inertia = (0.2 kg*m^2, 0.3 kg*m^2, 0.4 kg*m^2)\n"
 
     MISSING_INERTIA "E0224" "inertia missing"
     "A revolute joint can turn this body, so its moment of inertia about the centre of gravity counts: `inertia = 2 kg*m^2`\n\
@@ -175,15 +211,24 @@ codes! {
     "Prismatic and revolute joints have an axis, `prismatic(z)` or `revolute((0, 0.6, 0.8))`; fixed joints have none. A\n\
      direction is not the zero vector.\n"
 
+    BARE_ANGLE "E0227" "angle without unit"
+    "Angles are dimensionless with rad = 1, so that `sin(30)` is the sine of 30 rad, nearly five turns. Write `sin(30 deg)`.\n"
+
+    NOT_FINITE "E0228" "value that does not exist"
+    "The expression is a constant without finite value: a division by zero, the root of a negative number, the logarithm of zero.\n\
+     Inside a law the cause may be a field given as zero: `knee = 0 m/s` where the law divides by it.\n"
+
     BOUNDS "E0230" "bounds out of order"
-    "A range runs from the smaller to the larger value, and a start value lies inside its bounds.\n"
+    "A range runs from the smaller to the larger value, and a start value lies inside its bounds.\n\
+     Write `c in 10 .. 40 kN/m from 22 kN/m`.\n"
 
     IDENTIFY_TARGET "E0231" "cannot be identified"
     "Identified is either a free name used in the study, or a number that the study holds fixed, by its path: `tyre.stiffness`,\n\
      `wheel.mass`, `shaker.compression.slope`. A field that is given by an expression has no number to replace.\n"
 
     UNUSED_PARAMETER "E0232" "parameter without influence"
-    "Nothing that is simulated or measured depends on the parameter, so the data cannot tell its value.\n"
+    "Nothing that is simulated or measured depends on the parameter, so the data cannot tell its value.\n\
+     Use it in the model (`stiffness = c_strut`) or remove its line.\n"
 
     MISSING_START "E0233" "start not stated"
     "An experiment says how it starts: `start = equilibrium`, `start = rest`, or either with given values,\n\
@@ -191,16 +236,28 @@ codes! {
 
     FILTER_DESIGN "E0234" "filter cannot be designed"
     "A low-pass filter passes below and stops above: the pass edge lies below the stop edge, and the largest drop in the\n\
-     pass band (dB) below the smallest attenuation in the stop band (dB).\n"
+     pass band (dB) below the smallest attenuation in the stop band (dB).\n\
+     Write e.g. `lowpass butterworth pass 5 Hz (2 dB) stop 7 Hz (20 dB) zero_phase`.\n"
 
     NO_STUDY "E0235" "no study declared"
     "The file with the model begins with `study NAME \"title\"`.\n"
 
     LEFT_OUT "E0236" "parameter left out in a variant"
-    "The variant removes what the parameter acts on; it is not identified in this variant.\n"
+    "The variant removes what the parameter acts on; it is not identified in this variant.\n\
+     Nothing has to be done; `replace` instead of `remove` keeps the parameter in use.\n"
 
     UNUSED_DECLARATION "E0237" "without use"
-    "Something is declared that nothing depends on.\n"
+    "Something is declared that nothing depends on.\n\
+     Use it, e.g. `command = u`, or remove it.\n"
+
+    PRIOR_OUTSIDE "E0238" "prior outside of the bounds"
+    "What is known beforehand contradicts the bounds: the fit will end at a bound, and its intervals mean nothing there.\n\
+     Correct whichever is wrong:\n\
+     \n    identify { c in 10 .. 40 kN/m from 22 kN/m prior 20 +- 3 kN/m }\n"
+
+    REACHES_ZERO "E0239" "mass can become zero"
+    "The bounds of a mass include zero. A search that tries it finds equations without solution; a lower bound above zero costs\n\
+     nothing: `m in 0.5 .. 20 kg from 5 kg`.\n"
 
     RECURSIVE_MODEL "E0241" "model contains itself"
     "A model may use other models as parts, but not itself, neither directly nor through others. What repeats is a family:\n\
@@ -226,7 +283,11 @@ codes! {
 
     NOT_REPEATABLE "E0246" "cannot be repeated"
     "Models and families contain what can stand in a machine several times: bodies, joints, forces, signals, constants, measures,\n\
-     parts, families, identified parameters. Experiments, inputs, variants, laws and the like stand outside.\n"
+     parts, families, identified parameters. Experiments, inputs, variants, laws and the like stand outside.\n\
+     \n\
+     \x20   model corner(carrier: point, command: signal) { .. }\n\
+     \x20   input u [mm]\n\
+     \x20   part left: corner at chassis.left, u\n"
 
     OUTSIDE_OF_MODEL "E0247" "not known in the model"
     "A model sees its own declarations, its ports and parameters, `ground`, `t`, `pi` and the constants of the study. Everything\n\
@@ -239,7 +300,8 @@ codes! {
      of the study, as variants do: `add force front.stop: end_stop ..`.\n"
 
     TOO_LARGE "E0249" "study too large"
-    "Models and families make more declarations than can be treated.\n"
+    "Models and families make more declarations than can be treated.\n\
+     Reduce the limits of `for i in 1 .. n`; a long flexible part is better an elastic body than a chain of rigid ones.\n"
 
     TABLE_POINTS "E0251" "points of a table"
     "A table has at least two points with one argument and one value each, the arguments growing from point to point. A bare\n\
@@ -258,6 +320,12 @@ codes! {
      \n`linear`: straight lines; `monotone`: smooth and without overshoot; `cubic`: smooth, for curves without corners. Beyond the\n\
      points: `constant`, `linear` with the slope at the end, or `error`.\n"
 
+    SAME_DATA "E0257" "held-out data are not held out"
+    "An experiment of the role `validation` or `test` judges the model on data that the fit has not seen. It shares its samples with\n\
+     an experiment of another role; give it another record, or `window`s that do not overlap:\n\
+     \n    experiment fit_1 estimation { data = \"a.csv\", window = 0 s .. 10 s, start = rest }\n\
+     \x20   experiment check_1 validation { data = \"a.csv\", window = 10 s .. 20 s, start = rest }\n"
+
     // ---- E03xx: mechanics ----
 
     UNCONNECTED_BODY "E0301" "body is not connected to ground"
@@ -267,11 +335,14 @@ codes! {
     CLOSED_LOOP "E0302" "joint cannot close its loop"
     "Joints form loops; the tool lets all but one of them carry bodies and turns the last into constraints. Joints that carry force\n\
      elements are kept, then those with the least freedom; among equals the last one declared closes the loop. A joint whose motion\n\
-     is prescribed, or whose shifts stand behind turns, cannot be the one that closes: declare it earlier.\n"
+     is prescribed, or whose shifts stand behind turns, cannot be the one that closes: declare it earlier.\n\
+     \n\
+     \x20   joint coupler: revolute(y) crank.tip -> rod\n"
 
     NO_INERTIA "E0303" "joint moves no inertia"
     "The acceleration of a coordinate is its load divided by the inertia that moves with it. A joint whose outer bodies have no\n\
-     mass (prismatic) or no moment of inertia about its axis (revolute) has no determined acceleration.\n"
+     mass (prismatic) or no moment of inertia about its axis (revolute) has no determined acceleration.\n\
+     Give the outer body `mass = .. kg` (and `inertia`), or weld it with a `fixed` joint.\n"
 
     COINCIDENT_POINTS "E0304" "force element without direction"
     "A force element between two points acts along the line that joins them. Points that coincide in the reference configuration\n\
@@ -279,26 +350,34 @@ codes! {
 
     ACCELERATION_IN_LOAD "E0305" "load depends on an acceleration"
     "Accelerations follow from the loads, so that a load may not depend on one directly. What is accelerated is mass or inertia\n\
-     of a body; a controller that feeds back a measured acceleration sees it through a sensor, a law with a state.\n"
+     of a body; a controller that feeds back a measured acceleration sees it through a sensor, a law with a state.\n\
+     \n\
+     \x20   measure a [m/s^2] = guide.acceleration { lag = 1 ms }\n"
 
     UNKNOWN_START "E0306" "start value is not determined"
     "A start value may depend on parameters, inputs, and states whose own start value is given; not on itself, and not on a state\n\
-     that follows from equilibrium.\n"
+     that follows from equilibrium.\n\
+     \n\
+     \x20   start = rest { slide.velocity = 6 mm/s, strut.z = 0 mm }\n"
 
     UNKNOWN_QUANTITY "E0307" "quantity that nothing defines"
-    "An expression mentions a quantity that is neither the time, a state, a parameter, nor the motion of an element of the study.\n"
+    "An expression mentions a quantity that is neither the time, a state, a parameter, nor the motion of an element of the study.\n\
+     Declare it, or correct its name: `guide.position`, `tyre.force`.\n"
 
     FORCE_ON_FIXED_JOINT "E0308" "force on a joint that cannot move"
-    "A force element on a joint acts along or about the joint's axis. A fixed joint has none.\n"
+    "A force element on a joint acts along or about the joint's axis. A fixed joint has none.\n\
+     Let it stand on a joint that moves, or between two bodies: `force f: spring a -> b { .. }`.\n"
 
     REDUNDANT_CONSTRAINT "E0309" "constraint holds what others hold already"
     "A closed loop of revolute joints in space is held several times over: in a planar four-bar linkage each joint keeps the bodies in\n\
      their plane. The motion is not affected, but the reactions in these directions cannot be determined by mechanics of rigid\n\
      bodies (in the real machine they depend on clearances and flexibility). The tool drops such constraints, says so, and names the\n\
-     joint that would do without them.\n"
+     joint that would do without them.\n\
+     Nothing has to be done unless reactions are wanted; then use `spherical` or `cylindrical` joints where the machine has play.\n"
 
     CANNOT_MOVE "E0310" "mechanism cannot move"
-    "The loops take away as many freedoms as the joints give. Count: every body has six, a joint takes those it does not leave free.\n"
+    "The loops take away as many freedoms as the joints give. Count: every body has six, a joint takes those it does not leave free.\n\
+     Remove a joint, or exchange one for a kind with more freedom (`spherical` for `revolute`).\n"
 
     CANNOT_ASSEMBLE "E0311" "loop cannot be assembled"
     "Near the start no position of the bodies closes all loops. Either a length is wrong (the sides of a four-bar that is too long to\n\
@@ -311,11 +390,16 @@ codes! {
      missing, may not be read, or is no text. Paths are relative to the study's file, or to `--data DIR`.\n"
 
     DATA_EMPTY "E0402" "data file without samples"
-    "The file holds no head line or no line of numbers below it.\n"
+    "The file holds no head line or no line of numbers below it.\n\
+     \n\
+     \x20   t [s],u [mm],z [mm]\n\
+     \x20   0.000,0.0,1.2\n\
+     \x20   0.001,0.1,1.2\n"
 
     DATA_NOT_A_NUMBER "E0403" "cell is not a number"
     "Every cell of a used column must hold a number, with decimal point, or decimal comma where columns are separated by\n\
-     semicolons or tabs. No value is made up for an empty or unreadable cell: mend or cut the record.\n"
+     semicolons or tabs. No value is made up for an empty or unreadable cell: mend or cut the record.\n\
+     Write `1.5` or `1.5e-3`, without unit and without separators of thousands.\n"
 
     DATA_NOT_FINITE "E0404" "sample is NaN or infinite"
     "A used column holds `NaN` or an infinite value. Samples are never skipped or replaced: mend the record, or choose a\n\
@@ -327,15 +411,18 @@ codes! {
 
     DATA_TIME_ORDER "E0406" "time does not increase"
     "The time column must grow from line to line. Repeated or backward stamps mean lost or doubled lines, or two records\n\
-     written into one file.\n"
+     written into one file.\n\
+     Remove doubled lines; write joined records as separate files with an `experiment` each.\n"
 
     DATA_NOT_UNIFORM "E0407" "samples are not equidistant"
     "Filters and spectra need equidistant samples. Small jitter of the stamps (5 % of a step) is accepted; a gap or a\n\
-     changing rate is not: resample the record, or cut it at the gap.\n"
+     changing rate is not: resample the record, or cut it at the gap.\n\
+     Cut at the gap by `window = 0 s .. 12 s`.\n"
 
     DATA_CONSTANT "E0408" "channel is constant"
     "A measured channel that never changes holds no information to compare with: a dead sensor, a wrong column, or a\n\
-     window in which nothing happens.\n"
+     window in which nothing happens.\n\
+     Choose the column by `columns = { z = \"other head\" }`, or leave the channel out by `measures = { .. }`.\n"
 
     DATA_TOO_SHORT "E0409" "too few samples"
     "The record, or the part of it inside the `window`, has too few samples for what is asked of it.\n"
@@ -345,11 +432,13 @@ codes! {
      kind of quantity, and it must be there unless the quantity is dimensionless.\n"
 
     DATA_LAYOUT "E0411" "table is not rectangular or its head is unclear"
-    "Every line needs as many cells as the head has columns, and every head its own name.\n"
+    "Every line needs as many cells as the head has columns, and every head its own name.\n\
+     Mend the line, or give doubled heads different names: `acc_1 [m/s^2],acc_2 [m/s^2]`.\n"
 
     FILTER_IMPOSSIBLE "E0412" "filter cannot be designed"
     "A low-pass is given by its pass edge, stop edge and the attenuations there: pass below stop, stop below half the\n\
-     sampling rate, pass-band drop below stop-band attenuation.\n"
+     sampling rate, pass-band drop below stop-band attenuation.\n\
+     Write e.g. `pass 5 Hz (2 dB) stop 7 Hz (20 dB)` for a record at 100 Hz.\n"
 
     // ---- E05xx: simulation ----
 
@@ -359,22 +448,26 @@ codes! {
 
     SIMULATION_FAILED "E0502" "simulation failed"
     "The integration could not go on. The message names the time, the cause and the state to blame; typical causes are a\n\
-     start value far from reality, a law that jumps, a wrong sign, or a motion without equilibrium.\n"
+     start value far from reality, a law that jumps, a wrong sign, or a motion without equilibrium.\n\
+     `ident simulate --set \"c=20\"` tries other values; `start = equilibrium` begins at rest under load.\n"
 
     // ---- E06xx: fit and diagnosis ----
 
     NO_INFLUENCE "E0602" "parameter without influence"
     "No path leads from the parameter to any measured channel, so that no data can determine it. Measure something that\n\
-     depends on it, or hold it fixed.\n"
+     depends on it, or hold it fixed.\n\
+     Add a `measure` that sees it, or replace its name by a number.\n"
 
     FIT_FAILED "E0601" "fit cannot begin"
     "The model cannot be simulated at the start values of the parameters, or the bounds contradict each other. The message\n\
-     names the first simulation that failed.\n"
+     names the first simulation that failed.\n\
+     Try `ident simulate` at the start values first; move `from ..` nearer to the real value.\n"
 
     // ---- E07xx: command line ----
 
     CANNOT_READ_FILE "E0701" "file cannot be read"
-    "The file does not exist, may not be read, or is not UTF-8 text. The message names the reason given by the system.\n"
+    "The file does not exist, may not be read, or is not UTF-8 text. The message names the reason given by the system.\n\
+     Paths in `use \"part.ident\"` are relative to the file that contains them.\n"
 }
 
 #[cfg(test)]

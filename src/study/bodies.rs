@@ -8,7 +8,7 @@ use super::identify::written_unit;
 use super::model::{Attachment, AxisMotion, Body, Point};
 use super::topology::End;
 use crate::diagnostics::{Code, Diagnostic, Span};
-use crate::expression::{Node, vector};
+use crate::expression::{Node, Operation, vector};
 use crate::quantities::Dimension;
 use crate::syntax::{Expression, Field, Value};
 
@@ -44,6 +44,9 @@ impl<'a> Checker<'a> {
                 None => self.graph.constant(f64::NAN),
             };
             if let Some(inertia) = self.body_inertia(index) {
+                if let Some(field) = find(declared.bodies[index].fields, "inertia") {
+                    self.check_inertia(&inertia, &declared.bodies[index].name.text, value_span(field));
+                }
                 self.bodies[index].inertia = inertia;
             }
         }
@@ -66,8 +69,50 @@ impl<'a> Checker<'a> {
             let value = checker.field_value(&format!("{}.mass", body.name.text), expression, Allowed::Constant)?;
             let value = checker.expect(value, expression.span, Dimension::MASS, (field.key.span, "`mass`"), SCOPE)?;
             checker.not_negative(value, expression.span, "a mass")?;
+            checker.stays_positive(value, "mass", &body.name.text);
             Some(value)
         })
+    }
+
+    /// An identified mass must not reach zero: nothing would be left to accelerate.
+    fn stays_positive(&mut self, value: Typed, what: &str, body: &str) {
+        let Operation::Symbol(symbol) = self.graph.operation(value.node) else { return };
+        let Some(parameter) = self.parameters.iter().find(|parameter| parameter.symbol == symbol) else { return };
+        if parameter.lower > 0.0 {
+            return;
+        }
+        let message = format!("the {what} of `{body}` can become {}", parameter.unit.format(parameter.lower, 3));
+        let diagnostic = Diagnostic::warning(Code::REACHES_ZERO, message)
+            .label(parameter.span, "its lower bound is not above zero")
+            .help("raise the lower bound to the smallest value that makes sense");
+        self.report(diagnostic, SCOPE);
+    }
+
+    /// No distribution of mass has these moments: each principal one is at most the sum of the other two.
+    fn check_inertia(&mut self, inertia: &[Node; 6], body: &str, span: Span) {
+        let values = inertia.map(|node| self.graph.constant_value(node));
+        let [Some(xx), Some(yy), Some(zz), Some(xy), Some(xz), Some(yz)] = values else { return };
+        // With half the trace less the tensor, all principal minors must not be negative.
+        let half = 0.5 * (xx + yy + zz);
+        let (a, b, c) = (half - xx, half - yy, half - zz);
+        let is_possible = |sign: f64| {
+            let minors = [a, b, c, a * b - xy * xy, a * c - xz * xz, b * c - yz * yz];
+            let products = 2.0 * sign * xy * xz * yz;
+            let determinant = a * b * c + products - a * yz * yz - b * xz * xz - c * xy * xy;
+            let small = -1e-6 * half.abs();
+            minors[..3].iter().all(|minor| *minor >= small)
+                && minors[3..].iter().all(|minor| *minor >= small * half)
+                && determinant >= small * half * half
+        };
+        // Products of inertia are written with either sign.
+        if is_possible(1.0) || is_possible(-1.0) {
+            return;
+        }
+        let diagnostic =
+            Diagnostic::warning(Code::IMPOSSIBLE_INERTIA, format!("no body has the moments of inertia of `{body}`"))
+                .label(span, "one of them is larger than the sum of the others")
+                .help("check units and order `(Ixx, Iyy, Izz, Ixy, Ixz, Iyz)`; in a plane, one number about the joint's axis suffices");
+        self.report(diagnostic, SCOPE);
     }
 
     fn not_negative(&mut self, value: Typed, span: Span, what: &str) -> Option<()> {

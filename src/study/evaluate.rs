@@ -36,6 +36,26 @@ pub(super) fn literal(expression: &Expression) -> Option<(f64, Option<&Name>)> {
 impl<'a> Checker<'a> {
     /// The value of `expression`; `None` after a finding has been reported.
     pub fn evaluate(&mut self, expression: &'a Expression, scope: Scope) -> Option<Typed> {
+        let value = self.evaluate_kind(expression, scope)?;
+        let is_calculated = matches!(expression.kind, ExpressionKind::Binary { .. } | ExpressionKind::Call { .. });
+        match self.graph.constant_value(value.node) {
+            Some(number) if is_calculated && !number.is_finite() && !self.may_be_undefined(&expression.kind) => {
+                let message = if number.is_nan() { "this has no value" } else { "this is infinite" };
+                let diagnostic = Diagnostic::error(Code::NOT_FINITE, message)
+                    .label(expression.span, "whatever the simulation does")
+                    .help("a division by zero, or a root, logarithm or inverse function outside of its range");
+                self.fail(diagnostic, scope)
+            }
+            _ => Some(value),
+        }
+    }
+
+    /// A table that is asked beyond its points says so when it is simulated.
+    fn may_be_undefined(&self, kind: &ExpressionKind) -> bool {
+        matches!(kind, ExpressionKind::Call { function, .. } if self.is_table(&function.text))
+    }
+
+    fn evaluate_kind(&mut self, expression: &'a Expression, scope: Scope) -> Option<Typed> {
         match &expression.kind {
             ExpressionKind::Number { value, unit } => self.number(*value, unit.as_ref(), scope),
             ExpressionKind::Path(name) => self.path(name, scope),
@@ -59,8 +79,23 @@ impl<'a> Checker<'a> {
                 let node = self.graph.constant(read.to_si(value));
                 Some(Typed { writing: read.angle_content(), ..Typed::new(node, read.dimension) })
             }
-            Err(diagnostic) => self.fail(diagnostic, scope),
+            Err(diagnostic) => match self.product_without_sign(value, unit) {
+                Some(product) => self.fail(product, scope),
+                None => self.fail(diagnostic, scope),
+            },
         }
+    }
+
+    /// `2 c_strut`: the word behind a number is read as its unit, but is a name of the study.
+    fn product_without_sign(&mut self, value: f64, unit: &Name) -> Option<Diagnostic> {
+        let end = unit.text.find(['*', '/', '^', '(']).unwrap_or(unit.text.len());
+        let name = &unit.text[..end];
+        let is_known = self.parameter(name).is_some() || self.entities.contains_key(name);
+        is_known.then(|| {
+            Diagnostic::error(Code::PRODUCT, format!("`{name}` is no unit"))
+                .label(unit.span, "read as the unit of the number before it")
+                .help(format!("a product needs its sign: `{value} * {name}`"))
+        })
     }
 
     fn operation(
@@ -82,6 +117,11 @@ impl<'a> Checker<'a> {
                 Some(Typed::new(self.graph.binary(function, a.node, b.node), a.dimension))
             }
             Operator::Multiply => Some(Typed::new(self.graph.multiply(a.node, b.node), a.dimension * b.dimension)),
+            Operator::Divide if self.graph.is_zero(b.node) => {
+                let diagnostic =
+                    Diagnostic::error(Code::NOT_FINITE, "division by zero").label(right.span, "this is zero");
+                self.fail(diagnostic, scope)
+            }
             Operator::Divide => Some(Typed::new(self.graph.divide(a.node, b.node), a.dimension / b.dimension)),
             Operator::Power => self.power((a, left.span), (b, right.span), scope),
             Operator::Less | Operator::LessEqual | Operator::Greater | Operator::GreaterEqual => {
@@ -134,7 +174,7 @@ impl<'a> Checker<'a> {
         if value.is_condition {
             return Some(());
         }
-        let diagnostic = Diagnostic::error(Code::WRONG_VALUE, "a condition is expected here")
+        let diagnostic = Diagnostic::error(Code::CONDITION, "a condition is expected here")
             .label(span, format!("this is a number ({})", (value.dimension)))
             .help("compare it: `x > 0 mm`");
         self.fail(diagnostic, scope)
@@ -144,7 +184,7 @@ impl<'a> Checker<'a> {
     fn power(&mut self, base: (Typed, Span), exponent: (Typed, Span), scope: Scope) -> Option<Typed> {
         let node = self.graph.binary(Binary::Power, base.0.node, exponent.0.node);
         if exponent.0.dimension != Dimension::ONE {
-            let diagnostic = Diagnostic::error(Code::DIMENSION_MISMATCH, "an exponent must be dimensionless")
+            let diagnostic = Diagnostic::error(Code::EXPONENT, "an exponent must be dimensionless")
                 .label(exponent.1, format!("this is {}", (exponent.0.dimension)));
             return self.fail(diagnostic, scope);
         }
@@ -152,7 +192,7 @@ impl<'a> Checker<'a> {
             return Some(Typed::new(node, Dimension::ONE));
         }
         let Some(value) = self.graph.constant_value(exponent.0.node) else {
-            let diagnostic = Diagnostic::error(Code::DIMENSION_MISMATCH, "the dimension of this power is not known")
+            let diagnostic = Diagnostic::error(Code::EXPONENT, "the dimension of this power is not known")
                 .label(exponent.1, "this exponent is not a number")
                 .secondary(base.1, format!("this is {}", (base.0.dimension)))
                 .help("make the base dimensionless, e.g. `(x / (1 m)) ^ n`");
@@ -161,7 +201,7 @@ impl<'a> Checker<'a> {
         match base.0.dimension.power_real(value) {
             Some(dimension) => Some(Typed::new(node, dimension)),
             None => {
-                let diagnostic = Diagnostic::error(Code::DIMENSION_MISMATCH, "this power has no proper dimension")
+                let diagnostic = Diagnostic::error(Code::EXPONENT, "this power has no proper dimension")
                     .label(exponent.1, format!("the exponent is {value}"))
                     .secondary(base.1, format!("this is {}", (base.0.dimension)))
                     .help("make the base dimensionless, e.g. `(x / (1 m)) ^ 1.5`");

@@ -16,7 +16,28 @@ const SCOPE: Scope = Scope::Study(Allowed::Number);
 impl<'a> Checker<'a> {
     pub fn finished_experiments(&mut self) -> Vec<Experiment> {
         let declared: &'a super::declarations::Declarations<'a> = self.declared;
-        declared.experiments.iter().filter_map(|experiment| self.experiment(experiment)).collect()
+        let experiments: Vec<Experiment> =
+            declared.experiments.iter().filter_map(|experiment| self.experiment(experiment)).collect();
+        self.check_shared_data(&experiments);
+        experiments
+    }
+
+    /// What was fitted says nothing about other motions.
+    fn check_shared_data(&mut self, experiments: &[Experiment]) {
+        for (at, second) in experiments.iter().enumerate() {
+            let overlaps = |first: &&Experiment| match (first.window, second.window) {
+                (Some(a), Some(b)) => a.0 < b.1 && b.0 < a.1,
+                _ => true,
+            };
+            let same = |first: &&Experiment| first.data == second.data && first.role != second.role;
+            let Some(first) = experiments[..at].iter().filter(same).find(overlaps) else { continue };
+            let message = format!("`{}` and `{}` have different roles but the same data", first.name, second.name);
+            let diagnostic = Diagnostic::warning(Code::SAME_DATA, message)
+                .label(second.data_span, "the same samples")
+                .secondary(first.data_span, "used here")
+                .help("hold data out that the fit has not seen: another record, or `window`s that do not overlap");
+            self.report(diagnostic, SCOPE);
+        }
     }
 
     fn experiment(&mut self, experiment: &Declared<'a>) -> Option<Experiment> {

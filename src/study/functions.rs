@@ -1,7 +1,7 @@
 //! Functions that expressions can call.
 
 use super::checker::{Checker, Scope};
-use super::evaluate::Typed;
+use super::evaluate::{Typed, literal};
 use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use crate::expression::{Binary, Node, Operation, Unary};
 use crate::quantities::Dimension;
@@ -70,9 +70,25 @@ impl<'a> Checker<'a> {
             let message = format!("`{}` takes {expected}, found {}", function.text, arguments.len());
             return self.fail(Diagnostic::error(Code::WRONG_ARGUMENTS, message).label(span, ""), scope);
         }
+        if let (Function::Ratio(Unary::Sin | Unary::Cos | Unary::Tan), [argument]) = (what, arguments) {
+            self.check_bare_angle(function, argument, scope);
+        }
         let values: Option<Vec<(Typed, Span)>> =
             values.into_iter().zip(arguments).map(|(value, argument)| Some((value?, argument.span))).collect();
         self.apply_function(what, function, &values?, span, scope)
+    }
+
+    /// `sin(30)` is most probably meant in degrees.
+    fn check_bare_angle(&mut self, function: &Name, argument: &Expression, scope: Scope) {
+        if let Some((value, None)) = literal(argument)
+            && value.abs() > std::f64::consts::TAU
+        {
+            let message = format!("`{}` of {value} rad", function.text);
+            let diagnostic = Diagnostic::warning(Code::BARE_ANGLE, message)
+                .label(argument.span, "a bare number is an angle in radians")
+                .help(format!("write `{value} deg` if degrees are meant, `{value} rad` if not"));
+            self.report(diagnostic, scope);
+        }
     }
 
     fn function_names(&self) -> Vec<&'a str> {

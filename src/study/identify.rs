@@ -102,6 +102,16 @@ impl<'a> Checker<'a> {
             Some(prior) => Some(self.read_prior(prior, start.dimension, target)?),
             None => None,
         };
+        if let (Some(prior), Some((written, _))) = (&prior, &line.prior)
+            && !(low..=high).contains(&prior.mean)
+        {
+            let message = format!("the prior of `{}` lies outside its bounds", line.target.text);
+            let diagnostic = Diagnostic::warning(Code::PRIOR_OUTSIDE, message)
+                .label(written.span, unit.format(prior.mean, 6))
+                .secondary(line.lower.span.to(line.upper.span), "the bounds")
+                .help("the fit will stop at the bound; widen the bounds or correct the prior");
+            self.report(diagnostic, NUMBERS);
+        }
         let symbol = self.graph.symbol(&line.target.text);
         let name = line.target.text.clone();
         Some(Parameter { name, symbol, unit, lower: low, upper: high, start: value, prior, span: line.target.span })

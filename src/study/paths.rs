@@ -6,7 +6,7 @@ use super::kinds::{coordinate_dimension, rate_dimension};
 use super::model::{Attachment, Motion, PointMotion, PointQuantity, ReactionQuantity};
 use crate::diagnostics::{Code, Diagnostic, similar_name};
 use crate::expression::Symbol;
-use crate::quantities::Dimension;
+use crate::quantities::{Dimension, Unit};
 use crate::syntax::Name;
 
 impl<'a> Checker<'a> {
@@ -334,6 +334,12 @@ impl<'a> Checker<'a> {
             let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("there is no `{first}`"))
                 .label(name.span, "not declared")
                 .suggest(similar);
+            return self.fail_unknown(first, diagnostic, scope);
+        }
+        if first.chars().count() > 1 && Unit::parse(first).is_ok() {
+            let diagnostic = Diagnostic::error(Code::UNIT_AS_NAME, format!("`{first}` is a unit, not a value"))
+                .label(name.span, "a unit follows its number")
+                .help(format!("write `1 {first}`; behind a name, `c * 1 {first}`"));
             return self.fail_unknown(first, diagnostic, scope);
         }
         let diagnostic = Diagnostic::error(Code::NOT_IDENTIFIED, format!("`{first}` has no value"))

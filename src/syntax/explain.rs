@@ -4,6 +4,7 @@ use super::grammar::Rule;
 use super::scan::{Token, TokenKind};
 use super::split::{KEYWORDS, comment_help};
 use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
+use crate::quantities::Unit;
 use pest::error::{Error, ErrorVariant, InputLocation};
 
 /// An error and where it lies among the tokens of its declaration.
@@ -116,7 +117,30 @@ impl Context<'_> {
 
     /// Errors that deserve a message of their own.
     fn special(&self, rules: &[Rule]) -> Option<Diagnostic> {
-        self.bad_number().or_else(|| self.misspelt_word(rules))
+        self.bad_number()
+            .or_else(|| self.spaced_unit(0))
+            .or_else(|| self.spaced_unit(-1))
+            .or_else(|| self.misspelt_word(rules))
+    }
+
+    /// `12 kN m`: the parts of a unit are joined by signs. The word may have been taken for the key of a further entry.
+    fn spaced_unit(&self, places: isize) -> Option<Diagnostic> {
+        if self.kind(places) != Some(TokenKind::Word) || self.first_on_line(places) || self.word(places + 1) == "=" {
+            return None;
+        }
+        let before = &self.tokens[..self.index.checked_add_signed(places)?];
+        let number = before.iter().rposition(|token| token.kind == TokenKind::Number)?;
+        let unit = self.text.get(before[number].end..before.last()?.end)?.trim();
+        let joined = format!("{unit}*{}", self.word(places));
+        if unit.contains('\n') || Unit::parse(unit).is_err() || Unit::parse(&joined).is_err() {
+            return None;
+        }
+        let start = before.get(number + 1)?.start as u32;
+        let message = format!("the unit `{unit} {}` contains a blank", self.word(places));
+        let diagnostic = Diagnostic::error(Code::SPACED_UNIT, message)
+            .label(Span { start, ..self.span_of(places) }, "a unit is one word")
+            .help(format!("write `{joined}`"));
+        Some(diagnostic)
     }
 
     /// `mass =` with nothing behind it: the value is missing at the end of its line, and the first word of the next
@@ -155,6 +179,9 @@ impl Context<'_> {
     }
 
     fn incomplete(&self, rules: &[Rule]) -> Diagnostic {
+        if let Some(diagnostic) = self.spaced_unit(-1) {
+            return diagnostic;
+        }
         let end = self.span_of(-1).end;
         let message = format!("expected {} after `{}`", expectation(rules), self.word(-1));
         let finding = Diagnostic::error(Code::UNEXPECTED_TEXT, message)
