@@ -1,13 +1,16 @@
 //! What an identified model is good for.
 //!
 //! *In*: a compiled study with manoeuvres and criteria, an estimate with its covariance. *Out*: per criterion its value,
-//! interval and verdict ([`Validity`]). *Must not happen here*: fits, files, text for a terminal.
+//! interval and verdict ([`Validity`]); before any test, what
+//! the offered excitations and sensors would tell ([`Plan`]). *Must not happen here*: fits, files, text for a terminal.
 
 mod criterion;
 mod increments;
 mod monte_carlo;
+mod plan;
 mod validity;
 
 pub use criterion::{CriterionValues, evaluate};
 pub use monte_carlo::MonteCarlo;
+pub use plan::*;
 pub use validity::*;

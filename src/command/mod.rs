@@ -12,6 +12,7 @@ mod fit;
 mod format;
 mod new;
 mod output;
+mod plan;
 mod progress;
 mod results;
 mod session;
@@ -44,6 +45,8 @@ enum Command {
     Diagnose(diagnose::Arguments),
     /// Fit all variants and show them side by side, on estimation and held-out data
     Compare(compare::Arguments),
+    /// Plan tests: what excitations and sensors would tell about the parameters and criteria
+    Plan(plan::Arguments),
     /// Judge what the identified model is good for: criteria with confidence
     Validate(validate::Arguments),
     /// Bring study files into canonical layout
@@ -99,6 +102,7 @@ pub fn run() -> ExitCode {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Plan(arguments) => plan::run(&arguments),
         Command::Validate(arguments) => validate::run(&arguments),
         Command::Fmt(arguments) => format::run(&arguments),
         Command::New(arguments) => new::run(&arguments),

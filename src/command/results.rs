@@ -5,6 +5,7 @@ use super::fit::FittedVariant;
 use super::output::write_whole;
 use crate::fit::{PriorRow, Progress};
 use crate::identify::{SavedResult, confidence};
+use crate::quantities::Unit;
 use crate::simulation::Compiled;
 use crate::study::{Parameter, Role};
 use serde::{Deserialize, Serialize};
@@ -31,10 +32,23 @@ pub(super) fn save(path: &Path, fit: &FittedVariant) -> Result<(), Failed> {
 
 /// What an earlier fit knows about these parameters.
 pub(super) fn read(path: &Path, parameters: &[Parameter]) -> Result<Vec<PriorRow>, Failed> {
+    saved(path)?.rows(parameters).map_err(|what| complain(path, &what))
+}
+
+fn saved(path: &Path) -> Result<SavedResult, Failed> {
     let text = std::fs::read_to_string(path).map_err(|error| complain(path, &format!("cannot read it: {error}")))?;
-    let saved: SavedResult =
-        serde_json::from_str(&text).map_err(|error| complain(path, &format!("is no saved result: {error}")))?;
-    saved.rows(parameters).map_err(|what| complain(path, &what))
+    serde_json::from_str(&text).map_err(|error| complain(path, &format!("is no saved result: {error}")))
+}
+
+/// Puts the values of a saved result (SI) in the place of those in `theta`, where they lie within the bounds.
+pub(super) fn values(path: &Path, parameters: &[Parameter], theta: &mut [f64]) -> Result<(), Failed> {
+    for saved in saved(path)?.parameters {
+        if let Some(index) = parameters.iter().position(|parameter| parameter.name == saved.name) {
+            let unit = Unit::parse(&saved.unit).map_err(|_| complain(path, &format!("`{}` is no unit", saved.unit)))?;
+            theta[index] = unit.to_si(saved.value).clamp(parameters[index].lower, parameters[index].upper);
+        }
+    }
+    Ok(())
 }
 
 /// Best parameters so far, SI by name.

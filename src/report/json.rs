@@ -3,7 +3,7 @@
 //! The schema's text lies in `docs/schema/`; it is generated from the types and their documentation, and a test keeps
 //! both equal.
 
-use crate::analyse::Validity;
+use crate::analyse::{Plan, Validity};
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 use schemars::{JsonSchema, Schema, generate::SchemaSettings, transform::Transform};
@@ -16,6 +16,7 @@ pub const DIAGNOSIS: &str = "ident.diagnosis/1";
 pub const IDENTIFICATION: &str = "ident.identification/1";
 pub const COMPARISON: &str = "ident.comparison/1";
 pub const VALIDITY: &str = "ident.validity/1";
+pub const PLAN: &str = "ident.plan/1";
 
 /// Result of `ident diagnose`.
 pub fn answer(answer: &Answer) -> Result<String, serde_json::Error> {
@@ -37,6 +38,11 @@ pub fn validity(validity: &Validity) -> Result<String, serde_json::Error> {
     envelope(VALIDITY, validity)
 }
 
+/// Result of `ident plan`.
+pub fn plan(plan: &Plan) -> Result<String, serde_json::Error> {
+    envelope(PLAN, plan)
+}
+
 /// The JSON Schemas by name of output, ready to be written to `docs/schema/`.
 pub fn schemas() -> Vec<(&'static str, Value)> {
     vec![
@@ -44,6 +50,7 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
         (IDENTIFICATION, schema::<Identification>(IDENTIFICATION)),
         (COMPARISON, schema::<Vec<Identification>>(COMPARISON)),
         (VALIDITY, schema::<Validity>(VALIDITY)),
+        (PLAN, schema::<Plan>(PLAN)),
     ]
 }
 

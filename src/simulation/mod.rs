@@ -16,7 +16,7 @@ mod tangent;
 pub use certificate::certify;
 pub use failure::{Detail, Failure};
 pub use inputs::RecordInputs;
-pub use manoeuvre::manoeuvre;
+pub use manoeuvre::{excitation, manoeuvre};
 pub use prepare::{Record, prepare};
 pub use run::{Compiled, Gradient, Trajectory, probe, simulate, slowness};
 pub use slowness::{Limit, Slowness};

@@ -3,5 +3,6 @@
 mod combination;
 mod coverage;
 mod nuisance;
+mod plan;
 mod shipped;
 mod validity;

@@ -8,6 +8,7 @@ mod discrepancy;
 mod histories;
 mod missing;
 mod parameters;
+mod plan;
 mod ranking;
 mod template;
 mod validity;
@@ -16,7 +17,7 @@ mod view;
 pub(crate) use missing::{ordered as places, over_rate as missing_over_rate};
 pub use template::RenderError;
 
-use crate::analyse::Validity;
+use crate::analyse::{Plan, Validity};
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 
@@ -50,4 +51,12 @@ pub fn comparison(variants: &[Identification]) -> Result<String, RenderError> {
 /// As [`answer`].
 pub fn validity(result: &Validity) -> Result<String, RenderError> {
     template::render("validity.html", &validity::view(result), "[]")
+}
+
+/// What tests would tell, as a page.
+///
+/// # Errors
+/// As [`answer`].
+pub fn plan(result: &Plan) -> Result<String, RenderError> {
+    template::render("plan.html", &plan::view(result), "[]")
 }

@@ -3,12 +3,13 @@
 use minijinja::{AutoEscape, Environment, context, value::Serde};
 use serde::Serialize;
 
-const TEMPLATES: [(&str, &str); 6] = [
+const TEMPLATES: [(&str, &str); 7] = [
     ("layout.html", include_str!("layout.html")),
     ("parts.html", include_str!("parts.html")),
     ("answer.html", include_str!("answer.html")),
     ("fit.html", include_str!("fit.html")),
     ("comparison.html", include_str!("comparison.html")),
+    ("plan.html", include_str!("plan.html")),
     ("validity.html", include_str!("validity.html")),
 ];
 const STYLE: &str = include_str!("style.css");

@@ -5,11 +5,12 @@
 
 mod answer;
 mod identification;
+mod plan;
 mod sheet;
 mod table;
 mod validity;
 
-use crate::analyse::Validity;
+use crate::analyse::{Plan, Validity};
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 
@@ -58,4 +59,14 @@ pub fn validity(result: &Validity) -> String {
 /// Verdicts on criteria.
 pub fn validity_in(result: &Validity, colour: Colour) -> String {
     validity::text(result, colour)
+}
+
+/// What tests would tell, without colours.
+pub fn plan(result: &Plan) -> String {
+    plan_in(result, Colour::Never)
+}
+
+/// What tests would tell.
+pub fn plan_in(result: &Plan, colour: Colour) -> String {
+    plan::text(result, colour)
 }

@@ -1,0 +1,146 @@
+//! What tests would tell, as a page.
+
+use crate::analyse::{Excitation, Outcome, Plan};
+use crate::report::chart::{Bar, Style, bars};
+use crate::report::number;
+use serde::Serialize;
+
+const BAR_WIDTH: f64 = 260.0;
+
+#[derive(Serialize)]
+pub struct PlanPage {
+    title: String,
+    study: String,
+    best: Vec<String>,
+    excitations: Vec<ExcitationView>,
+    fix: Vec<String>,
+    remarks: Vec<String>,
+    accuracy: String,
+}
+
+#[derive(Serialize)]
+struct ExcitationView {
+    name: String,
+    title: String,
+    duration: String,
+    rate: String,
+    useful_rate: String,
+    enough: String,
+    d: String,
+    a: String,
+    parameters: Vec<ParameterView>,
+    undetermined: Vec<String>,
+    criteria: Vec<String>,
+    sensors: Vec<SensorView>,
+}
+
+#[derive(Serialize)]
+struct ParameterView {
+    name: String,
+    unit: String,
+    value: String,
+    deviation: String,
+    relative: String,
+    bars_svg: String,
+}
+
+#[derive(Serialize)]
+struct SensorView {
+    name: String,
+    alone: String,
+    without: String,
+}
+
+pub fn view(plan: &Plan) -> PlanPage {
+    let best = plan.best.iter().map(|best| {
+        let excitation = best.excitation.as_deref().unwrap_or("none determines it");
+        match best.measure.as_str() {
+            "D" => format!("Smallest confidence ellipsoid of all parameters (D): {excitation}"),
+            "A" => format!("Smallest mean variance of the parameters (A): {excitation}"),
+            criterion => format!("Best known criterion {criterion}: {excitation}"),
+        }
+    });
+    PlanPage {
+        title: "What tests would tell".to_owned(),
+        study: format!("{}, variant {}", plan.study, plan.variant),
+        best: best.collect(),
+        excitations: plan.excitations.iter().map(excitation).collect(),
+        fix: plan.fix.clone(),
+        remarks: plan.remarks.clone(),
+        accuracy: number::short(plan.accuracy, 3),
+    }
+}
+
+fn share(value: Option<f64>) -> String {
+    value.map_or_else(|| "undetermined".to_owned(), |value| format!("{} %", number::significant(100.0 * value, 3)))
+}
+
+fn excitation(excitation: &Excitation) -> ExcitationView {
+    let outcome = &excitation.outcome;
+    ExcitationView {
+        name: excitation.name.clone(),
+        title: excitation.title.clone(),
+        duration: number::short(excitation.duration, 4),
+        rate: number::short(excitation.rate, 4),
+        useful_rate: number::significant(excitation.useful_rate, 2),
+        enough: match (excitation.sufficient_duration, excitation.repetitions) {
+            (Some(until), _) => format!("after {} s", number::significant(until, 2)),
+            (None, Some(times)) => format!("{} repetitions", number::fixed(times, 0)),
+            (None, None) => "never".to_owned(),
+        },
+        d: share(outcome.d_measure),
+        a: share(outcome.a_measure),
+        parameters: parameters(outcome),
+        undetermined: outcome.undetermined.clone(),
+        criteria: outcome
+            .criteria
+            .iter()
+            .map(|criterion| match criterion.standard_deviation {
+                Some(deviation) => {
+                    format!("{}: deviation {} {}", criterion.name, number::significant(deviation, 3), criterion.unit)
+                }
+                None => format!("{}: depends on what is not determined", criterion.name),
+            })
+            .collect(),
+        sensors: excitation
+            .sensors
+            .iter()
+            .map(|sensor| SensorView {
+                name: sensor.name.clone(),
+                alone: share(sensor.alone),
+                without: share(sensor.without),
+            })
+            .collect(),
+    }
+}
+
+/// Bars: identifiability (its square root, so that weak parameters show), and the relative deviation.
+fn parameters(outcome: &Outcome) -> Vec<ParameterView> {
+    let relative = |k: usize| {
+        let parameter = &outcome.parameters[k];
+        parameter.standard_deviation.map(|deviation| deviation / parameter.value.abs())
+    };
+    let largest = (0..outcome.parameters.len()).filter_map(relative).fold(0.0, f64::max);
+    outcome
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(k, parameter)| ParameterView {
+            name: parameter.name.clone(),
+            unit: parameter.unit.clone(),
+            value: number::short(parameter.value, 5),
+            deviation: parameter
+                .standard_deviation
+                .map_or("undetermined".to_owned(), |value| number::significant(value, 3)),
+            relative: relative(k).map_or(String::new(), |value| number::percent(100.0 * value)),
+            bars_svg: bars(
+                &[
+                    Bar { value: parameter.identifiability.sqrt(), style: Style::After },
+                    Bar { value: relative(k).unwrap_or(largest) / largest, style: Style::Before },
+                ],
+                1.0,
+                BAR_WIDTH,
+            ),
+        })
+        .collect()
+}
