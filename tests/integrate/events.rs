@@ -147,10 +147,10 @@ fn a_ball_bounces_when_and_as_high_as_it_should() {
                 let seed = |i: usize, value: f64| Dual { value, slope: f64::from(i == j) };
                 let count = k + 1;
                 let (_, exact) = ball(t, count, seed(0, GRAVITY), seed(1, RESTITUTION));
-                for i in 0..2 {
+                for (i, exact) in exact.iter().enumerate() {
                     let (y, s) = (solution.y[2 * k + i], solution.sensitivity[(2 * k + j) * 2 + i]);
-                    assert!((y - exact[i].value).abs() < 1e-6, "{method:?} t = {t}: {y} {}", exact[i].value);
-                    assert!((s - exact[i].slope).abs() < 1e-5, "{method:?} t = {t}: {s} {}", exact[i].slope);
+                    assert!((y - exact.value).abs() < 1e-6, "{method:?} t = {t}: {y} {}", exact.value);
+                    assert!((s - exact.slope).abs() < 1e-5, "{method:?} t = {t}: {s} {}", exact.slope);
                 }
             }
         }
@@ -258,8 +258,8 @@ fn dry_friction_sticks_and_slips_when_it_should() {
         };
         assert!((solution.y[2] - stand([stiffness, rest, motion, speed])).abs() < 1e-7, "{method:?}");
         assert_eq!(solution.y[3], 0.0);
-        for j in 0..4 {
-            let step = 1e-4 * STICK_SLIP[j];
+        for (j, value) in STICK_SLIP.iter().enumerate() {
+            let step = 1e-4 * value;
             let moved =
                 |sign: f64| stand(std::array::from_fn(|i| STICK_SLIP[i] + if i == j { sign * step } else { 0.0 }));
             let difference = (moved(1.0) - moved(-1.0)) / (2.0 * step);

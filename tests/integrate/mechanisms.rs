@@ -8,7 +8,7 @@ use crate::system::Equations;
 pub struct Andrews;
 
 pub const ANDREWS_ANGLES: [f64; 7] = [
-    -0.061713890014276450,
+    -0.061_713_890_014_276_45,
     0.0,
     0.45527981916307038,
     0.22266839016588588,
