@@ -13,6 +13,8 @@ use super::stepper::{Limits, Refusal, first_not_finite};
 
 /// Share of the step kept after a failed solution of the implicit equations.
 const NEWTON_RETREAT: f64 = 0.25;
+/// Share of the bound of stability that leaves an explicit method room to spare.
+const MILD: f64 = 0.5;
 const SMALLEST_FACTOR: f64 = 0.25;
 const SAFETY: f64 = 0.9;
 /// First step: the change along the initial slope stays below this in the error norm ...
@@ -87,6 +89,11 @@ impl Bdf {
     /// Derivative of the solution at the end of the last step.
     pub fn derivative(&self) -> &[f64] {
         &self.z_prime
+    }
+
+    /// Whether an explicit method of this bound of stability could take the last step with room to spare.
+    pub fn is_mild(&self, stability: f64) -> bool {
+        self.history.last_step * self.newton.eigenvalue_bound < MILD * stability
     }
 
     pub fn restart(&mut self, t: f64, z: &[f64], z_prime: &[f64], limits: &Limits, end: f64) {

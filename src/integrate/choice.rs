@@ -1,9 +1,10 @@
-//! When to leave the explicit method.
+//! When to leave the explicit method, and when to come back to it.
 //!
 //! Steps at the bound of stability (Hairer-Wanner-1996, IV.2) alone do not make the implicit method cheaper: with a
 //! friction law that is stiff for short times only, its many short steps cost more. So stiffness starts a trial: the
 //! implicit method is kept if it advances further per unit of work. Work is counted in evaluations, not in seconds, so
-//! that every run takes the same decisions.
+//! that every run takes the same decisions. Once the implicit steps have been short enough for the explicit method for
+//! some time, stiffness has gone.
 
 use super::problem::Work;
 
@@ -19,12 +20,27 @@ const GAIN: f64 = 1.5;
 const FIRST_PAUSE: usize = 500;
 const PAUSE_GROWTH: usize = 4;
 
+/// Implicit steps within the stability of the explicit method before the return to it, and their growth per return.
+const MILD_STEPS: usize = 30;
+const MILD_GROWTH: usize = 2;
+
+/// What the last step says about stiffness.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stiffness {
+    /// An explicit step far from the bound of stability, or an implicit one well beyond it.
+    Unremarkable,
+    /// An explicit step near the bound of stability.
+    NearBound,
+    /// An implicit step that an explicit method could take.
+    Mild,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Advice {
     Stay,
     /// Try the implicit method from here.
     Try,
-    /// The trial has failed: go back.
+    /// The trial has failed, or stiffness has gone: go back.
     Return,
 }
 
@@ -64,6 +80,9 @@ pub(super) struct Monitor {
     gain: f64,
     pause: usize,
     no_trial_before: usize,
+    mild: usize,
+    mild_needed: usize,
+    has_gone: bool,
 }
 
 impl Default for Monitor {
@@ -77,16 +96,19 @@ impl Default for Monitor {
             gain: 0.0,
             pause: FIRST_PAUSE,
             no_trial_before: 0,
+            mild: 0,
+            mild_needed: MILD_STEPS,
+            has_gone: false,
         }
     }
 }
 
 impl Monitor {
     /// To be called after every step with the time reached and the work so far.
-    pub fn observe(&mut self, time: f64, near_stability: bool, work: &Work) -> Advice {
+    pub fn observe(&mut self, time: f64, stiffness: Stiffness, work: &Work) -> Advice {
         let now = Mark::new(time, work);
         match self.phase {
-            Phase::Explicit => self.observe_explicit(now, near_stability),
+            Phase::Explicit => self.observe_explicit(now, stiffness == Stiffness::NearBound),
             Phase::WarmUp { begin } => {
                 if now.steps - begin.steps >= WARM_UP {
                     self.phase = Phase::Trial { begin: now };
@@ -94,7 +116,7 @@ impl Monitor {
                 Advice::Stay
             }
             Phase::Trial { begin } => self.observe_trial(begin, now),
-            Phase::Implicit => Advice::Stay,
+            Phase::Implicit => self.observe_implicit(stiffness == Stiffness::Mild),
         }
     }
 
@@ -120,6 +142,18 @@ impl Monitor {
         Advice::Try
     }
 
+    fn observe_implicit(&mut self, mild: bool) -> Advice {
+        self.mild = if mild { self.mild + 1 } else { 0 };
+        if self.mild < self.mild_needed {
+            return Advice::Stay;
+        }
+        self.mild = 0;
+        self.mild_needed *= MILD_GROWTH;
+        self.has_gone = true;
+        self.phase = Phase::Explicit;
+        Advice::Return
+    }
+
     fn observe_trial(&mut self, begin: Mark, now: Mark) -> Advice {
         if now.steps - begin.steps < TRIAL - WARM_UP {
             return Advice::Stay;
@@ -129,6 +163,7 @@ impl Monitor {
             self.phase = Phase::Implicit;
             return Advice::Stay;
         }
+        self.has_gone = false;
         self.phase = Phase::Explicit;
         self.no_trial_before = now.steps + self.pause;
         self.pause *= PAUSE_GROWTH;
@@ -138,6 +173,9 @@ impl Monitor {
     /// In words, after advice to change.
     pub fn reason(&self) -> String {
         match self.phase {
+            Phase::Explicit if self.has_gone => {
+                "stiffness has gone: the implicit steps were short enough for the explicit method".to_owned()
+            }
             Phase::Explicit => format!(
                 "stability limits the explicit steps at times, but the implicit method advanced only {:.2} times as far per evaluation",
                 self.gain

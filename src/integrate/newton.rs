@@ -28,6 +28,18 @@ const POLISH_ITERATIONS: usize = 12;
 /// Correction, in the error norm, that counts as rounding.
 const POLISHED: f64 = 1e-9;
 
+/// Largest sum of a row of `|f_y| = |c I - J|`, rows and columns in typical magnitudes.
+fn bound_of_eigenvalues<D: Dynamics + ?Sized>(system: &Augmented<D>, c: f64) -> f64 {
+    let scale = system.dynamics.scale();
+    let mut sums = vec![0.0; system.n];
+    let places = system.jacobian_rows.iter().zip(&system.jacobian_columns);
+    for ((&row, &column), value) in places.zip(&system.jacobian) {
+        let entry = if row == column { value - c } else { *value };
+        sums[row] += entry.abs() * scale[column] / scale[row];
+    }
+    sums.into_iter().fold(0.0, f64::max)
+}
+
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NewtonFailure {
     pub cause: FailureCause,
@@ -82,6 +94,8 @@ pub(super) struct Newton {
     /// `c dF/dy'` at the last renewal, for [`Newton::filter`]; empty where there is nothing to filter.
     mass: Vec<f64>,
     has_hidden_algebraic: bool,
+    /// For `y' = f`: a bound of the eigenvalues of f_y (row sums in typical magnitudes) at the last renewal; infinite else.
+    pub eigenvalue_bound: f64,
     filtered: Vec<f64>,
 }
 
@@ -98,6 +112,7 @@ impl Newton {
             scaled: Vec::new(),
             mass: Vec::new(),
             has_hidden_algebraic: system.structure.has_hidden_algebraic,
+            eigenvalue_bound: f64::INFINITY,
             filtered: Vec::new(),
         }
     }
@@ -134,6 +149,9 @@ impl Newton {
         self.rate_factor = CAUTIOUS_RATE;
         if self.has_hidden_algebraic {
             self.renew_mass(system, end);
+        }
+        if system.explicit {
+            self.eigenvalue_bound = bound_of_eigenvalues(system, end.leading);
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::augmented::Augmented;
 use super::bdf::Bdf;
-use super::choice::{Advice, Monitor};
+use super::choice::{Advice, Monitor, Stiffness};
 use super::consistent::{Consistency, make_consistent};
 use super::events::Events;
 use super::norm::ErrorNorm;
@@ -10,6 +10,7 @@ use super::problem::{Dynamics, FailureCause, MethodChoice, Options, Plan, Start}
 use super::recorder::Recorder;
 use super::runge_kutta::RungeKutta;
 use super::stepper::{Limits, Refusal};
+use super::tsitouras::STABILITY;
 
 const EXPLICIT_NAME: &str = "Runge-Kutta 5(4)";
 const BDF_NAME: &str = "BDF";
@@ -285,8 +286,12 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
 
     fn heed_monitor(&mut self, end: f64) -> Result<(), Refusal> {
         let Some(monitor) = &mut self.monitor else { return Ok(()) };
-        let near_stability = self.method == Method::Explicit && self.runge_kutta.near_stability;
-        let method = match monitor.observe(self.time, near_stability, &self.system.work) {
+        let stiffness = match self.method {
+            Method::Explicit if self.runge_kutta.near_stability => Stiffness::NearBound,
+            Method::Bdf if self.bdf.is_mild(STABILITY) => Stiffness::Mild,
+            Method::Explicit | Method::Bdf => Stiffness::Unremarkable,
+        };
+        let method = match monitor.observe(self.time, stiffness, &self.system.work) {
             Advice::Stay => return Ok(()),
             Advice::Try => Method::Bdf,
             Advice::Return => Method::Explicit,

@@ -90,3 +90,32 @@ fn index_2_pendulum_stays_on_its_circle() {
     }
     assert_eq!(system.differential()[4..], [false, false]);
 }
+
+/// `x' = -lambda(t) (x - cos t) - sin t`, stiff at first: lambda falls from 1e5 to 1 at t = 2. The solution is cos t.
+struct FadingStiffness;
+
+impl Equations for FadingStiffness {
+    fn dimension(&self) -> usize {
+        1
+    }
+
+    fn rates<S: Scalar>(&self, t: f64, y: &[S], _theta: &[S]) -> Option<Vec<S>> {
+        let lambda = 1.0 + 5e4 * (1.0 - (20.0 * (t - 2.0)).tanh());
+        Some(vec![S::from(-lambda) * (y[0] - S::from(t.cos())) - S::from(t.sin())])
+    }
+}
+
+#[test]
+fn the_explicit_method_comes_back_when_stiffness_has_gone() {
+    let mut system = System::new(FadingStiffness, &[]);
+    let start = Start { time: 0.0, y: vec![1.0], y_prime: vec![0.0], sensitivity: Vec::new() };
+    let options = Options { relative_tolerance: 1e-8, ..Options::default() };
+    let solution = integrate(&mut system, &start, &[100.0], &[], &options).unwrap();
+    assert!((solution.y[0] - 100.0f64.cos()).abs() < 1e-5);
+    let [(to_bdf, _), (back, name)] = solution.work.switches[..] else { panic!("{:?}", solution.work.switches) };
+    assert!(to_bdf < 0.5 && (2.0..4.0).contains(&back) && name == solution.work.method, "{:?}", solution.work.switches);
+    assert!(solution.work.reason.contains("stiffness has gone"), "{}", solution.work.reason);
+    let only_bdf = Options { method: MethodChoice::Bdf, ..options };
+    let bdf = integrate(&mut system, &start, &[100.0], &[], &only_bdf).unwrap();
+    assert!(solution.work.steps < bdf.work.steps, "{} {}", solution.work.steps, bdf.work.steps);
+}
