@@ -667,10 +667,19 @@ fn all_starts(
 
 /// Everything that is left must be time, a state or a parameter.
 fn refuse_unknown_symbols(study: &Study, tree: &Tree, system: &System) -> Result<(), Vec<Diagnostic>> {
-    let mut known: Vec<Symbol> = system.states.iter().map(|state| state.symbol).collect();
+    let mut known: std::collections::HashSet<Symbol> = system.states.iter().map(|state| state.symbol).collect();
     known.extend(&system.parameters);
     known.extend(system.algebraic.iter().map(|variable| variable.symbol));
-    known.push(system.time);
+    known.insert(system.time);
+    let mut roots: Vec<Node> = system.rates.clone();
+    roots.extend(system.outputs.iter().map(|output| output.value));
+    roots.extend(system.starts.iter().flatten().filter_map(|equation| match equation {
+        StartEquation::Value(node) => Some(*node),
+        StartEquation::Equilibrium => None,
+    }));
+    if system.graph.symbols_of(&roots).iter().all(|symbol| known.contains(symbol)) {
+        return Ok(());
+    }
     let mut errors = Vec::new();
     let mut check = |what: &str, node: Node, span: Span| {
         for symbol in system.graph.symbols_of(&[node]).into_iter().filter(|symbol| !known.contains(symbol)) {

@@ -240,12 +240,14 @@ impl<'a> Checker<'a> {
 
     /// What a joint moves must have inertia against that motion.
     fn check_moving_masses(&mut self) {
+        let mut moved_by: Vec<Vec<usize>> = vec![Vec::new(); self.topology.joints.len()];
+        for body in 0..self.bodies.len() {
+            self.topology.chain(Some(body)).into_iter().for_each(|joint| moved_by[joint].push(body));
+        }
         for joint in 0..self.topology.joints.len() {
-            let Some(read) = self.topology.joint(joint) else { continue };
+            let Some(read) = self.topology.joint(joint).filter(|_| !self.topology.closes_loop[joint]) else { continue };
             let (child, freedom) = (read.child, &read.freedom);
-            let moved: Vec<usize> = (0..self.bodies.len())
-                .filter(|body| Some(*body) == child.body || self.topology.chain(Some(*body)).contains(&joint))
-                .collect();
+            let moved = &moved_by[joint];
             let is_weightless = |body: &usize| self.graph.is_zero(self.bodies[*body].mass);
             let has_no_inertia = |body: &usize| self.bodies[*body].inertia.iter().all(|part| self.graph.is_zero(*part));
             let moves_freely = |at: usize| !self.topology.closes_loop[joint] && !self.is_prescribed(joint, at);

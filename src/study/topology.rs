@@ -180,7 +180,7 @@ impl<'a> Checker<'a> {
         Some(End { body, point })
     }
 
-    /// Joints with prescribed motion come first, then those that carry elements, then those with the least freedom, so that loops are closed where the fewest
+    /// Joints with prescribed motion come first, then those that carry elements, then free ones, then those with the least freedom, so that loops are closed where the fewest
     /// constraints arise; among equals the ones declared first.
     fn choose_tree(&mut self) {
         let ground = self.declared.bodies.len();
@@ -199,7 +199,9 @@ impl<'a> Checker<'a> {
         candidates.sort_by_key(|joint| {
             self.topology.joint(*joint).map(|read| {
                 let is_driven = find(self.declared.joints[*joint].fields, "motion").is_some();
-                (!is_driven, !carries_elements(read), read.freedom.degrees_of_freedom())
+                // A free joint holds nothing: it is there to give its body coordinates.
+                let is_free = read.freedom.kind == JointKind::Free;
+                (!is_driven, !carries_elements(read), !is_free, read.freedom.degrees_of_freedom())
             })
         });
         let mut closes_loop: Vec<bool> = self.topology.joints.iter().map(Option::is_some).collect();

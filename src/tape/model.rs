@@ -160,18 +160,22 @@ impl Model {
     /// p x m reach, row per parameter.
     pub fn parameter_reach(&self) -> Vec<Vec<bool>> {
         let (n, p, m) = (self.dimension(), self.parameter_count(), self.output_count());
-        let mut influences = vec![vec![false; m]; n];
-        for element in &self.output_by_state.elements {
-            influences[element.column as usize][element.row as usize] = true;
+        let mut needs: Vec<Vec<usize>> = vec![Vec::new(); n];
+        for element in &self.jacobian.elements {
+            needs[element.row as usize].push(element.column as usize);
         }
-        let add = |to: &mut Vec<bool>, from: &[bool]| to.iter_mut().zip(from).for_each(|(to, from)| *to |= from);
-        // Influence travels from a variable to all whose equation contains it; n rounds reach everything.
-        for _ in 0..n {
-            for element in &self.jacobian.elements {
-                let of_equation = influences[element.row as usize].clone();
-                add(&mut influences[element.column as usize], &of_equation);
+        // Per variable the outputs it influences: those that contain it, or whose variables' equations contain it.
+        let mut influences = vec![vec![false; m]; n];
+        let mut waiting: Vec<(usize, usize)> = Vec::new();
+        for element in &self.output_by_state.elements {
+            waiting.push((element.column as usize, element.row as usize));
+        }
+        while let Some((variable, output)) = waiting.pop() {
+            if !std::mem::replace(&mut influences[variable][output], true) {
+                waiting.extend(needs[variable].iter().map(|&needed| (needed, output)));
             }
         }
+        let add = |to: &mut Vec<bool>, from: &[bool]| to.iter_mut().zip(from).for_each(|(to, from)| *to |= from);
         let mut reach = vec![vec![false; m]; p];
         for element in &self.output_by_parameter.elements {
             reach[element.column as usize][element.row as usize] = true;
