@@ -256,3 +256,209 @@ fn mass_on_a_spring_of_no_length() {
         assert!((own["z"][100 * (k + 1)] - z).abs() < 2e-8);
     }
 }
+
+/// A record of some values: only its times matter. `heads` as `name [unit]`.
+fn times_only(heads: &[&str], duration: f64) -> String {
+    let times: Vec<f64> = (0..=200).map(|k| duration * f64::from(k) / 200.0).collect();
+    let mut columns = vec![("t [s]", times.clone())];
+    columns.extend(
+        heads.iter().enumerate().map(|(i, head)| (*head, times.iter().map(|t| (3.0 * t + i as f64).sin()).collect())),
+    );
+    record(&columns)
+}
+
+/// A body without loads: kinetic energy and angular momentum (ground axes) stay, and the rates follow Euler's equations
+/// integrated here by fixed fine steps.
+#[test]
+fn free_body_turns_as_euler_says() {
+    let text = r#"
+study euler_top
+body top { mass = 2 kg, inertia = (0.3, 0.5, 0.9 kg*m^2) }
+joint floating: free ground -> top
+measure wx [rad/s] = floating.angular_velocity.x
+measure wy [rad/s] = floating.angular_velocity.y
+measure wz [rad/s] = floating.angular_velocity.z
+measure Lx [N*m*s] = (0.3 * floating.angular_velocity.x * top.axis_x.x + 0.5 * floating.angular_velocity.y * top.axis_y.x + 0.9 * floating.angular_velocity.z * top.axis_z.x) * 1 kg*m^2
+measure Lz [N*m*s] = (0.3 * floating.angular_velocity.x * top.axis_x.z + 0.5 * floating.angular_velocity.y * top.axis_y.z + 0.9 * floating.angular_velocity.z * top.axis_z.z) * 1 kg*m^2
+experiment run {
+  data = "run.csv"
+  start = rest { floating.angular_velocity.x = 0.2 rad/s, floating.angular_velocity.y = 5 rad/s, floating.angular_velocity.z = 0.1 rad/s }
+}
+solver { tolerance = 1e-11 }
+"#;
+    let heads = ["wx [rad/s]", "wy [rad/s]", "wz [rad/s]", "Lx [N*m*s]", "Lz [N*m*s]"];
+    let own = simulated("euler_top", text, &times_only(&heads, 20.0));
+    let inertia = [0.3, 0.5, 0.9];
+    let euler = |w: [f64; 3]| -> [f64; 3] {
+        std::array::from_fn(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            (inertia[j] - inertia[k]) / inertia[i] * w[j] * w[k]
+        })
+    };
+    let mut w = [0.2, 5.0, 0.1];
+    let (count, h) = (1000, 20.0 / 200.0 / 1000.0);
+    let moved = |w: [f64; 3], k: [f64; 3], h: f64| -> [f64; 3] { std::array::from_fn(|i| w[i] + h * k[i]) };
+    for sample in 0..=200 {
+        for (channel, value) in ["wx", "wy", "wz"].iter().zip(w) {
+            let error = (own[*channel][sample] - value).abs();
+            assert!(error < 2e-7, "{channel} at sample {sample}: {error:.2e}");
+        }
+        for _ in 0..count {
+            let a = euler(w);
+            let b = euler(moved(w, a, h / 2.0));
+            let c = euler(moved(w, b, h / 2.0));
+            let d = euler(moved(w, c, h));
+            w = std::array::from_fn(|i| w[i] + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
+        }
+    }
+    for channel in ["Lx", "Lz"] {
+        let drift = own[channel].iter().map(|value| (value - own[channel][0]).abs()).fold(0.0, f64::max);
+        println!("Euler top: {channel} drifts by {drift:.1e}");
+        assert!(drift < 1e-8, "{channel} drifts by {drift:.2e}");
+    }
+}
+
+/// Heavy symmetric top in steady precession: `(I3 w3 - I1 W cos th) W = m g l` (Goldstein-2002, 5.7).
+#[test]
+fn heavy_top_precesses_steadily() {
+    let (tilt, precession): (f64, f64) = (0.6, 2.5);
+    let (i1, i3, mgl) = (0.05 + 1.5 * 0.2 * 0.2, 0.02, 1.5 * 9.81 * 0.2);
+    let spin = (mgl / precession + i1 * precession * tilt.cos()) / i3;
+    let text = format!(
+        r#"
+study heavy_top
+gravity = 9.81 m/s^2 along -z
+body top {{ mass = 1.5 kg, centre_of_gravity = (0 m, 0 m, 0.2 m), inertia = (0.05, 0.05, 0.02 kg*m^2) }}
+joint foot: spherical ground -> top
+measure nx = top.axis_z.x
+measure ny = top.axis_z.y
+measure nz = top.axis_z.z
+experiment run {{
+  data = "run.csv"
+  start = rest {{
+    foot.quaternion.w = {}, foot.quaternion.x = {}
+    foot.angular_velocity.y = {} rad/s, foot.angular_velocity.z = {spin} rad/s
+  }}
+}}
+solver {{ tolerance = 1e-11 }}
+"#,
+        (tilt / 2.0).cos(),
+        (tilt / 2.0).sin(),
+        precession * tilt.sin()
+    );
+    let own = simulated("heavy_top", &text, &times_only(&["nx", "ny", "nz"], 5.0));
+    for sample in 0..=200 {
+        let angle = precession * 5.0 * sample as f64 / 200.0;
+        let expected = [tilt.sin() * angle.sin(), -tilt.sin() * angle.cos(), tilt.cos()];
+        for (channel, expected) in ["nx", "ny", "nz"].iter().zip(expected) {
+            let error = (own[*channel][sample] - expected).abs();
+            assert!(error < 1e-7, "{channel} at sample {sample}: {error:.2e}");
+        }
+    }
+}
+
+/// A point mass circling on a ball joint: `W^2 = g / (l cos th)`; the joint carries weight and centripetal force.
+#[test]
+fn conical_pendulum_circles() {
+    let (tilt, length): (f64, f64) = (0.7, 1.3);
+    let rate = (9.81 / (length * tilt.cos())).sqrt();
+    let text = format!(
+        r#"
+study conical
+gravity = 9.81 m/s^2 along -z
+body ball {{ mass = 0.8 kg, inertia = 0 kg*m^2 }}
+joint angles: axes(turn z, turn y) ground -> arm
+joint grip: fixed arm.end -> ball
+body arm {{ mass = 0 kg, inertia = 0 kg*m^2, point end = (0 m, 0 m, {}m) }}
+measure x [m] = ball.position.x
+measure y [m] = ball.position.y
+measure Fz [N] = angles.reaction.force.z
+measure Fx [N] = grip.reaction.force.x
+experiment run {{
+  data = "run.csv", start = rest {{ angles.turn_y.position = {tilt}, angles.turn_z.velocity = {rate} rad/s }}
+}}
+solver {{ tolerance = 1e-11 }}
+"#,
+        format!("{} ", -length)
+    );
+    let own = simulated("conical", &text, &times_only(&["x [m]", "y [m]", "Fz [N]", "Fx [N]"], 4.0));
+    let radius = length * tilt.sin();
+    for sample in 0..=200 {
+        let angle = rate * 4.0 * sample as f64 / 200.0;
+        let expected = [
+            ("x", -radius * angle.cos()),
+            ("y", -radius * angle.sin()),
+            ("Fz", 0.8 * 9.81),
+            ("Fx", 0.8 * rate * rate * radius * angle.cos()),
+        ];
+        for (channel, expected) in expected {
+            let error = (own[channel][sample] - expected).abs();
+            assert!(error < 1e-7, "{channel} at sample {sample}: {error:.2e}");
+        }
+    }
+}
+
+/// A four-bar linkage of hinges in space, its crank turned as prescribed: the rocker's angle by trigonometry, the redundant
+/// constraints named once, and the coordinate of the joint that closes the loop.
+#[test]
+fn four_bar_follows_its_crank() {
+    let (crank, coupler, rocker, base): (f64, f64, f64, f64) = (0.1, 0.42, 0.3, 0.5);
+    let text = format!(
+        r#"
+study four_bar
+body ground {{ point O2 = ({base} m, 0 m, 0 m) }}
+body crank {{ mass = 1 kg, inertia = 0.01 kg*m^2, point tip = ({crank} m, 0 m, 0 m) }}
+body coupler {{ mass = 2 kg, inertia = 0.03 kg*m^2, point tip = ({coupler} m, 0 m, 0 m) }}
+body rocker {{ mass = 1.5 kg, inertia = 0.02 kg*m^2, point tip = ({rocker} m, 0 m, 0 m) }}
+joint motor: revolute(z) ground -> crank {{ motion = 3 rad/s * t }}
+joint pin: revolute(z) crank.tip -> coupler
+joint foot: revolute(z) ground.O2 -> rocker
+joint head: revolute(z) coupler.tip -> rocker.tip
+measure rocker_angle = foot.position
+measure head_angle = head.position
+measure pin_angle = pin.position
+measure rate [rad/s] = head.velocity
+experiment run {{ data = "run.csv", start = rest {{ pin.position = 0.8, foot.position = 2 }} }}
+solver {{ tolerance = 1e-9 }}
+"#
+    );
+    let heads = ["rocker_angle", "head_angle", "pin_angle", "rate [rad/s]"];
+    let own = simulated("four_bar", &text, &times_only(&heads, 4.0));
+    for sample in 0..=200 {
+        let angle: f64 = 3.0 * 4.0 * sample as f64 / 200.0;
+        let (x, y) = (crank * angle.cos() - base, crank * angle.sin());
+        let reach = (x * x + y * y).sqrt();
+        // Angle between the rocker and the line from its foot to the crank's tip.
+        let inner = ((reach * reach + rocker * rocker - coupler * coupler) / (2.0 * reach * rocker)).acos();
+        let expected = y.atan2(x) - inner;
+        let error = (own["rocker_angle"][sample] - expected.rem_euclid(2.0 * std::f64::consts::PI)).abs();
+        assert!(error < 1e-7, "sample {sample}: {} instead of {expected}", own["rocker_angle"][sample]);
+        let closing = own["rocker_angle"][sample] - angle - own["pin_angle"][sample];
+        let error = (own["head_angle"][sample] - closing).sin().abs();
+        assert!(error < 1e-7, "closing angle at sample {sample}: {error:.2e}");
+    }
+}
+
+/// Friction in proportion to the force that a guide carries: the block stops where Coulomb says.
+#[test]
+fn friction_follows_the_reaction() {
+    let text = r#"
+study block
+gravity = 9.81 m/s^2 along -z
+body block { mass = 3 kg }
+joint guide: prismatic(x) ground -> block
+force rub: coulomb_glide on guide { friction = 0.2, normal = guide.reaction.force.z + 5 N, creep = 0.01 mm/s }
+measure x [m] = guide.position
+measure N [N] = guide.reaction.force.z
+experiment run { data = "run.csv", start = rest { guide.velocity = 2 m/s } }
+solver { tolerance = 1e-9 }
+"#;
+    let own = simulated("block", text, &times_only(&["x [m]", "N [N]"], 0.8));
+    let deceleration = 0.2 * (3.0 * 9.81 + 5.0) / 3.0;
+    for sample in 0..=200 {
+        let t = 0.8 * sample as f64 / 200.0;
+        let expected = 2.0 * t - 0.5 * deceleration * t * t;
+        assert!((own["x"][sample] - expected).abs() < 1e-6, "at {t} s");
+        assert!((own["N"][sample] - 3.0 * 9.81).abs() < 1e-6);
+    }
+}

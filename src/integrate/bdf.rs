@@ -17,6 +17,8 @@ const NEWTON_RETREAT: f64 = 0.25;
 const MILD: f64 = 0.5;
 const SMALLEST_FACTOR: f64 = 0.25;
 const SAFETY: f64 = 0.9;
+/// Errors between the ends of steps may be this much larger than at the ends.
+const INTERPOLATED_SHARE: f64 = 0.03;
 /// First step: the change along the initial slope stays below this in the error norm ...
 const FIRST_CHANGE: f64 = 0.5;
 /// ... and the step below this share of the span.
@@ -237,8 +239,17 @@ impl Bdf {
     /// Leaves the scratch memory changed.
     fn size_of_scratch<D: Dynamics + ?Sized>(&mut self, system: &Augmented<D>, state_only: bool) -> Size {
         let part = if state_only { system.n } else { self.scratch.len() };
+        let of = |norm: &mut ErrorNorm, error: &[f64]| if state_only { norm.of_state(error) } else { norm.of(error) };
+        // Constraints hold at the ends of steps; what is read between them is interpolated and has the whole error.
+        let between = self.newton.has_multipliers().then(|| of(&mut self.norm, &self.scratch));
         self.newton.filter(system, &mut self.scratch[..part]);
-        if state_only { self.norm.of_state(&self.scratch) } else { self.norm.of(&self.scratch) }
+        let at_end = of(&mut self.norm, &self.scratch);
+        match between {
+            Some(between) if INTERPOLATED_SHARE * between.norm > at_end.norm => {
+                Size { norm: INTERPOLATED_SHARE * between.norm, ..between }
+            }
+            _ => at_end,
+        }
     }
 
     /// Whether the order below would have had a smaller error; `size` is the norm of the correction.

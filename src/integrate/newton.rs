@@ -175,6 +175,11 @@ impl Newton {
         });
     }
 
+    /// Whether the system has constraints with multipliers.
+    pub fn has_multipliers(&self) -> bool {
+        self.has_multipliers
+    }
+
     /// Replaces an error by what it does to the solution, `J^-1 c dF/dy' e`, where some combinations of differential
     /// components are in fact algebraic. These are found anew in every step, so that their differences say nothing about
     /// errors; they follow the error of the others (Hairer-Wanner-1996, IV.8).

@@ -5,7 +5,7 @@ use super::prepare::Record;
 use super::slowness::Slowness;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::Symbol;
-use crate::integrate::{self, Dynamics, MethodChoice, Options, Plan, Solution, Start, Work};
+use crate::integrate::{self, Dynamics, FailureCause, MethodChoice, Options, Plan, Solution, Start, Work};
 use crate::mechanics::{self, System, Variable, VariableKind};
 use crate::study::{Method, Parameter, Study};
 use crate::tape::{Bound, Model};
@@ -154,6 +154,10 @@ fn run(
     let start = start(compiled, &mut bound, record, with_gradient).map_err(|failure| blame(&bound, failure))?;
     let mut solution = integrate::integrate(&mut bound, &start, &record.times, &record.breakpoints, &options)
         .map_err(|failure| blame(&bound, failure))?;
+    let moved = moved_starts(compiled, &mut bound, record, &start);
+    if !moved.is_empty() {
+        solution.work.reason += &format!("; start values moved to close the loops: {}", moved.join(", "));
+    }
     let (channels, gradients) = outputs(&mut bound, record, &solution, with_gradient);
     let finite = channels.iter().flatten().chain(gradients.iter().flatten()).all(|value| value.is_finite());
     if !finite {
@@ -189,12 +193,34 @@ pub(super) fn start(
         sensitivity.clear();
     }
     if bound.differential().contains(&false) {
-        return integrate::consistent_start(bound, t0, &y, &sensitivity, &stated(compiled, record.experiment));
+        let stated = stated(compiled, record.experiment);
+        return match integrate::consistent_start(bound, t0, &y, &sensitivity, &stated) {
+            // More positions of a loop are stated than it has freedoms: they say where it stands, not to the last digit.
+            Err(failure) if failure.cause == FailureCause::InconsistentStart => {
+                let laws: Vec<bool> =
+                    compiled.model.variables().iter().map(|variable| variable.kind == VariableKind::Law).collect();
+                integrate::consistent_start(bound, t0, &y, &sensitivity, &laws).map_err(|_| failure)
+            }
+            other => other,
+        };
     }
     let mut y_prime = vec![0.0; y.len()];
     bound.explicit_rates(t0, &y, &mut y_prime);
     Ok(Start { time: t0, y, y_prime, sensitivity })
 }
+
+/// Stated start values that did not close the loops and were moved.
+fn moved_starts(compiled: &Compiled, bound: &mut Bound, record: &Record, start: &Start) -> Vec<String> {
+    let given = bound.start_values(record.experiment, start.time).values;
+    let variables = compiled.model.variables().iter().zip(stated(compiled, record.experiment));
+    let moved = variables.enumerate().filter(|(i, (variable, is_stated))| {
+        *is_stated && (start.y[*i] - given[*i]).abs() > VISIBLE_MOVE * variable.scale
+    });
+    moved.map(|(_, (variable, _))| variable.name.clone()).collect()
+}
+
+/// Start values that move by less, relative to their typical magnitude, count as kept.
+const VISIBLE_MOVE: f64 = 1e-6;
 
 /// Variables whose start values are stated: by the experiment, or by a law for its states. Those of the reference
 /// configuration at rest are where the mechanism starts from to close its loops.
