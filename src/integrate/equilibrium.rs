@@ -1,5 +1,6 @@
 //! States in which nothing changes, and how they depend on the parameters.
 
+use super::equilibrium_sparse::{self, Accuracy};
 use super::problem::{Dynamics, Failure, FailureCause, Work};
 use super::stepper::first_not_finite;
 use super::structure::Structure;
@@ -61,7 +62,14 @@ pub fn equilibrium<D: Dynamics + ?Sized>(
         let trouble = Trouble { cause: FailureCause::InvalidRequest, component: None, equations: Vec::new() };
         return Err(fail(t, trouble, Work::default()));
     }
-    let mut search = Search::new(dynamics, t, y, unknown);
+    let mut work = Work { method: "Newton", ..Work::default() };
+    if unknown.iter().all(|u| *u) {
+        let accuracy = Accuracy { converged: CONVERGED, rounding: ROUNDING };
+        if let Some((y, sensitivity)) = equilibrium_sparse::solve(dynamics, t, y, &accuracy, &mut work) {
+            return Ok(Equilibrium { y, y_prime: vec![0.0; n], sensitivity, work });
+        }
+    }
+    let mut search = Search::new(dynamics, t, y, unknown, work);
     if search.unknowns.is_empty() {
         let (y, sensitivity) = (y.to_vec(), sensitivity.to_vec());
         return Ok(Equilibrium { y_prime: vec![0.0; n], y, sensitivity, work: search.work });
@@ -114,12 +122,11 @@ struct Linearisation {
 }
 
 impl<'d, D: Dynamics + ?Sized> Search<'d, D> {
-    fn new(dynamics: &'d mut D, t: f64, y: &[f64], unknown: &[bool]) -> Self {
+    fn new(dynamics: &'d mut D, t: f64, y: &[f64], unknown: &[bool], work: Work) -> Self {
         let n = y.len();
         let unknowns: Vec<usize> = (0..n).filter(|&i| unknown[i]).collect();
         let rows = equations(dynamics, t, y, unknown);
         let scale = unknowns.iter().map(|&i| dynamics.scale()[i]).collect();
-        let work = Work { method: "Newton", ..Work::default() };
         Self { dynamics, t, y: y.to_vec(), unknowns, rows, scale, zero: vec![0.0; n], work }
     }
 

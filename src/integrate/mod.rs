@@ -10,6 +10,7 @@ mod bdf_history;
 mod choice;
 mod consistent;
 mod equilibrium;
+mod equilibrium_sparse;
 mod events;
 mod newton;
 mod norm;

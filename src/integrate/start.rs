@@ -165,16 +165,23 @@ impl<'s, 'd, D: Dynamics + ?Sized> Projection<'s, 'd, D> {
         self.stage.rows.iter().map(|&row| all[row]).collect()
     }
 
-    fn linearise(&mut self, y: &[f64], columns: &[usize]) -> Result<Linearised, Problem> {
+    /// Derivatives of the constraints of the stage by `columns`, row by row.
+    fn matrix(&mut self, y: &[f64], columns: &[usize]) -> Vec<f64> {
         self.system.linearise(self.t, y, &self.zero, 0.0);
-        let (m, width) = (self.stage.rows.len(), columns.len());
-        let mut matrix = vec![0.0; m * width];
+        let width = columns.len();
+        let mut matrix = vec![0.0; self.stage.rows.len() * width];
         let places = self.system.jacobian_rows.iter().zip(&self.system.jacobian_columns);
         for ((row, column), &value) in places.zip(&self.system.jacobian) {
             if let (Ok(i), Ok(k)) = (self.stage.rows.binary_search(row), columns.binary_search(column)) {
                 matrix[i * width + k] = value;
             }
         }
+        matrix
+    }
+
+    fn linearise(&mut self, y: &[f64], columns: &[usize]) -> Result<Linearised, Problem> {
+        let (m, width) = (self.stage.rows.len(), columns.len());
+        let matrix = self.matrix(y, columns);
         let scaled = |i: usize, k: usize| matrix[i * width + k] * self.scale[columns[k]];
         let row_factor: Vec<f64> = (0..m)
             .map(|i| (0..width).map(|k| scaled(i, k) * scaled(i, k)).sum::<f64>().sqrt())
@@ -291,7 +298,7 @@ impl<'s, 'd, D: Dynamics + ?Sized> Projection<'s, 'd, D> {
         }
         self.system.held_derivative_right_hand_side(self.t, y, &self.zero, s, &mut of_constraints);
         let distance: Vec<f64> = columns.iter().map(|&i| (y[i] - given[i]) / self.scale[i]).collect();
-        let bend = self.bend(y, &linearised.multipliers(&distance), s)?;
+        let bend = self.bend(y, &linearised.multipliers(&distance), s);
         for j in 0..p {
             let right: Vec<f64> = self.stage.rows.iter().map(|&row| of_constraints[row * p + j]).collect();
             let mut target: Vec<f64> = columns.iter().map(|&i| original[i * p + j]).collect();
@@ -323,13 +330,13 @@ impl<'s, 'd, D: Dynamics + ?Sized> Projection<'s, 'd, D> {
     }
 
     /// Second derivatives of `nu^T c` by differences; zeros where nothing was moved.
-    fn bend(&mut self, y: &[f64], multipliers: &[f64], s: &[f64]) -> Result<Bend, Problem> {
+    fn bend(&mut self, y: &[f64], multipliers: &[f64], s: &[f64]) -> Bend {
         let (n, p) = (self.system.n, self.system.p);
         let columns = self.stage.columns.clone();
         let width = columns.len();
         let mut bend = Bend { second: vec![0.0; width * width], mixed: vec![0.0; width * p] };
         if multipliers.iter().all(|m| *m == 0.0) {
-            return Ok(bend);
+            return bend;
         }
         let mut right = vec![0.0; n * p];
         for (k, &moved) in columns.iter().enumerate() {
@@ -339,7 +346,7 @@ impl<'s, 'd, D: Dynamics + ?Sized> Projection<'s, 'd, D> {
                 point[moved] += distance * step;
                 // Known derivatives S of the other components and the parameters in one product.
                 self.system.held_derivative_right_hand_side(self.t, &point, &self.zero, s, &mut right);
-                let matrix = self.linearise(&point, &columns)?.matrix;
+                let matrix = self.matrix(&point, &columns);
                 for ((i, &row), multiplier) in self.stage.rows.iter().enumerate().zip(multipliers) {
                     let factor = weight / step * multiplier;
                     for l in 0..width {
@@ -351,7 +358,7 @@ impl<'s, 'd, D: Dynamics + ?Sized> Projection<'s, 'd, D> {
                 }
             }
         }
-        Ok(bend)
+        bend
     }
 }
 

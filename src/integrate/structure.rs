@@ -30,6 +30,9 @@ impl Structure {
         let n = y.len();
         let mut structure = Self { is_constraint: vec![false; n], is_multiplier: vec![false; n], ..Self::default() };
         let differential = dynamics.differential().to_vec();
+        if differential.iter().all(|d| *d) && dynamics.explicit_rates(t, y, &mut vec![0.0; n]) {
+            return structure;
+        }
         let Entries { by_y, by_derivative } = entries(dynamics, t, y, y_prime);
         let is_unit = |&(row, column, value): &(usize, usize, f64)| row == column && (value - 1.0).abs() < UNIT;
         structure.has_unit_mass = by_derivative.iter().all(is_unit);

@@ -2,7 +2,7 @@
 
 use crate::scalar::Scalar;
 use crate::system::{Equations, System};
-use ident::integrate::{FailureCause, equilibrium};
+use ident::integrate::{Dynamics, FailureCause, equilibrium};
 
 /// A mass on a spring with cubic part, gravity and a filter of the spring force: (x, v, z) with parameters
 /// (k, cubic, m, tau).
@@ -90,4 +90,54 @@ fn a_model_that_is_no_number_is_a_failure() {
     let mut system = System::new(at_rest(), &[f64::NAN, 3e5, 12.0, 0.05]);
     let failure = equilibrium(&mut system, 0.0, &[0.0; 3], &[0.0; 12], &[true; 3]).unwrap_err();
     assert_eq!(failure.cause, FailureCause::NotFinite);
+}
+
+/// Masses on springs in a row, hanging from the ceiling or falling freely; parameters: stiffness, gravity.
+struct Chain {
+    hangs: bool,
+}
+
+const MASSES: usize = 60;
+
+impl Equations for Chain {
+    fn dimension(&self) -> usize {
+        2 * MASSES
+    }
+
+    fn rates<S: Scalar>(&self, _t: f64, y: &[S], theta: &[S]) -> Option<Vec<S>> {
+        let (x, v) = y.split_at(MASSES);
+        let pull = |i: usize| {
+            let above = if i == 0 { S::from(0.0) } else { x[i - 1] };
+            if i == 0 && !self.hangs { S::from(0.0) } else { theta[0] * (above - x[i]) }
+        };
+        let below = |i: usize| if i + 1 < MASSES { pull(i + 1) } else { S::from(0.0) };
+        let mut rates = v.to_vec();
+        rates.extend((0..MASSES).map(|i| pull(i) - below(i) - theta[1] - v[i]));
+        Some(rates)
+    }
+}
+
+#[test]
+fn a_long_chain_hangs_as_its_springs_say_at_little_cost() {
+    let mut system = System::new(Chain { hangs: true }, &[500.0, 9.81]);
+    let n = system.dimension();
+    let start = vec![0.1; n];
+    let rest = equilibrium(&mut system, 0.0, &start, &vec![0.0; 2 * n], &vec![true; n]).unwrap();
+    let mut position = 0.0;
+    for i in 0..MASSES {
+        position -= (MASSES - i) as f64 * 9.81 / 500.0;
+        assert!((rest.y[i] - position).abs() < 1e-9 && rest.y[MASSES + i].abs() < 1e-9);
+        assert!((rest.sensitivity[i] + position / 500.0).abs() < 1e-11, "by stiffness");
+        assert!((rest.sensitivity[n + i] - position / 9.81).abs() < 1e-9, "by gravity");
+    }
+    assert!(rest.work.factorisations <= 5, "{:?}", rest.work);
+}
+
+#[test]
+fn a_long_chain_that_falls_has_no_equilibrium() {
+    let mut system = System::new(Chain { hangs: false }, &[500.0, 0.0]);
+    let n = system.dimension();
+    let failure = equilibrium(&mut system, 0.0, &vec![0.1; n], &vec![0.0; 2 * n], &vec![true; n]).unwrap_err();
+    assert_eq!(failure.cause, FailureCause::NoEquilibrium);
+    assert!(failure.component.is_some_and(|i| i < MASSES), "{failure:?}");
 }
