@@ -4,13 +4,17 @@
 //! interval and verdict ([`Validity`]); before any test, what
 //! the offered excitations and sensors would tell ([`Plan`]). *Must not happen here*: fits, files, text for a terminal.
 
+mod courses;
 mod criterion;
+mod cuts;
 mod increments;
 mod monte_carlo;
 mod plan;
 mod validity;
 
+pub use courses::{Course, Courses, courses};
 pub use criterion::{CriterionValues, evaluate};
+pub use cuts::{Cut, CutCurve, Cuts, cuts};
 pub use monte_carlo::MonteCarlo;
 pub use plan::*;
 pub use validity::*;

@@ -6,11 +6,13 @@
 mod check;
 mod compare;
 mod compile;
+mod cuts;
 mod diagnose;
 mod explain;
 mod fit;
 mod format;
 mod new;
+mod optimisers;
 mod output;
 mod plan;
 mod progress;
@@ -47,6 +49,10 @@ enum Command {
     Compare(compare::Arguments),
     /// Plan tests: what excitations and sensors would tell about the parameters and criteria
     Plan(plan::Arguments),
+    /// Cut the cost along every parameter, at two tolerances and in two bands
+    Cuts(cuts::Arguments),
+    /// Compare optimisers: cost over the number of simulations
+    Optimisers(optimisers::Arguments),
     /// Judge what the identified model is good for: criteria with confidence
     Validate(validate::Arguments),
     /// Bring study files into canonical layout
@@ -103,6 +109,8 @@ pub fn run() -> ExitCode {
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Cuts(arguments) => cuts::run(&arguments),
+        Command::Optimisers(arguments) => optimisers::run(&arguments),
         Command::Validate(arguments) => validate::run(&arguments),
         Command::Fmt(arguments) => format::run(&arguments),
         Command::New(arguments) => new::run(&arguments),

@@ -4,6 +4,7 @@
 //! *Out*: an [`Estimate`], whatever happens on the way; only a start that cannot be evaluated is a [`FitError`].
 //! *Must not happen here*: simulation, files, knowledge of bodies or names of channels.
 
+mod alternatives;
 mod constrained;
 mod cost;
 mod levenberg_marquardt;
@@ -13,6 +14,7 @@ mod prior;
 mod problem;
 mod step;
 
+pub use alternatives::{Optimiser, Search, search};
 pub use constrained::{Constraints, constrained};
 pub use cost::{ChannelCost, CostTree, magnitude_weight, noise_weight};
 pub use levenberg_marquardt::levenberg_marquardt;

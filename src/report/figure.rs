@@ -1,4 +1,5 @@
-//! The one picture of a diagnosis: histories before and after, and the missing force, as a stand-alone SVG file.
+//! Stand-alone SVG files: the one picture of a diagnosis (histories before and after, and the missing force), courses of
+//! optimisers, cuts of the cost.
 
 use crate::diagnose::{Answer, MissingForce};
 use crate::identify::{ChannelFit, RecordFit};
@@ -15,6 +16,10 @@ const LEFT_WIDTH: f64 = 540.0;
 /// The part of a long record that is drawn: short enough to show single reversals.
 const LONGEST_STRETCH: f64 = 0.5;
 
+const VARIANT_STYLE: &str = "\
+.line{stroke-width:1.6}.line.variant0{stroke:#d55e00}.line.variant1{stroke:#0072b2}.line.variant2{stroke:#009e73}\
+.line.variant3{stroke:#cc79a7}.line.variant4{stroke:#b58a00}.line.variant5{stroke:#56b4e9}";
+
 const STYLE: &str = "\
 text{font:12px system-ui,'Segoe UI','Helvetica Neue','DejaVu Sans',sans-serif;fill:#59636e}\
 text.label{fill:#1b1f24}text.title{font-weight:600;fill:#1b1f24}text.gain{font-size:14px}\
@@ -24,6 +29,18 @@ path{fill:none}.paper{fill:#fff}.grid{stroke:#e9ecef}.zero{stroke:#c5ccd3}.frame
 .cloud{stroke-width:2.4;stroke-linecap:round}.cloud.missing{stroke:#7a8794}.cloud.after{stroke:#0072b2}\
 .few{stroke-opacity:.35}.some{stroke-opacity:.65}.cloud.after.few,.cloud.after.some{stroke-opacity:.8}\
 .dot.missing{fill:#7a8794}.dot.after{fill:#0072b2}.ring{fill:#fff;stroke:#1b1f24;stroke-width:1.3}";
+
+pub use super::surface::{courses, cuts};
+
+/// A picture of its own with a title.
+pub(super) fn framed(width: f64, height: f64, title: &str, content: &str) -> String {
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\">\
+         <style>{STYLE}{VARIANT_STYLE}</style><rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\
+         <text class=\"title\" x=\"14\" y=\"24\" style=\"font-size:16px\">{}</text>{content}</svg>\n",
+        escape(title)
+    )
+}
 
 /// Measured against simulated (before and after) and residuals on the left, the missing force over velocity on the right.
 ///

@@ -3,7 +3,7 @@
 //! The schema's text lies in `docs/schema/`; it is generated from the types and their documentation, and a test keeps
 //! both equal.
 
-use crate::analyse::{Plan, Validity};
+use crate::analyse::{Courses, Cuts, Plan, Validity};
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 use schemars::{JsonSchema, Schema, generate::SchemaSettings, transform::Transform};
@@ -17,6 +17,8 @@ pub const IDENTIFICATION: &str = "ident.identification/1";
 pub const COMPARISON: &str = "ident.comparison/1";
 pub const VALIDITY: &str = "ident.validity/1";
 pub const PLAN: &str = "ident.plan/1";
+pub const OPTIMISERS: &str = "ident.optimisers/1";
+pub const CUTS: &str = "ident.cuts/1";
 
 /// Result of `ident diagnose`.
 pub fn answer(answer: &Answer) -> Result<String, serde_json::Error> {
@@ -43,6 +45,16 @@ pub fn plan(plan: &Plan) -> Result<String, serde_json::Error> {
     envelope(PLAN, plan)
 }
 
+/// Result of `ident optimisers`.
+pub fn courses(courses: &Courses) -> Result<String, serde_json::Error> {
+    envelope(OPTIMISERS, courses)
+}
+
+/// Result of `ident cuts`.
+pub fn cuts(cuts: &Cuts) -> Result<String, serde_json::Error> {
+    envelope(CUTS, cuts)
+}
+
 /// The JSON Schemas by name of output, ready to be written to `docs/schema/`.
 pub fn schemas() -> Vec<(&'static str, Value)> {
     vec![
@@ -51,6 +63,8 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
         (COMPARISON, schema::<Vec<Identification>>(COMPARISON)),
         (VALIDITY, schema::<Validity>(VALIDITY)),
         (PLAN, schema::<Plan>(PLAN)),
+        (OPTIMISERS, schema::<Courses>(OPTIMISERS)),
+        (CUTS, schema::<Cuts>(CUTS)),
     ]
 }
 

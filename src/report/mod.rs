@@ -19,5 +19,6 @@ pub mod json;
 pub mod number;
 pub mod page;
 
+mod surface;
 pub mod terminal;
 mod words;

@@ -5,4 +5,5 @@ mod coverage;
 mod nuisance;
 mod plan;
 mod shipped;
+mod surface;
 mod validity;

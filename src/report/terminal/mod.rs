@@ -7,10 +7,11 @@ mod answer;
 mod identification;
 mod plan;
 mod sheet;
+mod surface;
 mod table;
 mod validity;
 
-use crate::analyse::{Plan, Validity};
+use crate::analyse::{Courses, Cuts, Plan, Validity};
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 
@@ -69,4 +70,14 @@ pub fn plan(result: &Plan) -> String {
 /// What tests would tell.
 pub fn plan_in(result: &Plan, colour: Colour) -> String {
     plan::text(result, colour)
+}
+
+/// Optimisers side by side, without colours.
+pub fn courses(result: &Courses) -> String {
+    surface::courses(result, Colour::Never)
+}
+
+/// Cuts of the cost, without colours.
+pub fn cuts(result: &Cuts) -> String {
+    surface::cuts(result, Colour::Never)
 }

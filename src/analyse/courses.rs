@@ -1,0 +1,110 @@
+//! The cost over the work of several optimisers (the document's Figs. 3.4 and 3.5).
+
+use crate::fit::{Bounds, Control, LeastSquares, Optimiser, Options, Search, levenberg_marquardt, search};
+use crate::identify::{Problem, Settings, Weighting, fit, prefilters};
+use crate::simulation::{Compiled, Record};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Courses of all optimisers on one study.
+#[derive(Clone, Debug, JsonSchema, Serialize)]
+pub struct Courses {
+    pub study: String,
+    pub variant: String,
+    pub parameters: Vec<String>,
+    /// Allowed work in simulations of all records; a gradient by internal differentiation counts as one per parameter more.
+    pub budget: usize,
+    pub courses: Vec<Course>,
+}
+
+#[derive(Clone, Debug, JsonSchema, Serialize)]
+pub struct Course {
+    pub optimiser: String,
+    /// Best cost so far over the work: [simulations, cost].
+    pub history: Vec<(usize, f64)>,
+    pub cost: f64,
+    /// The search ended by itself.
+    pub converged: bool,
+    /// Work until the cost was within 1 % of the best of all; absent where it never was.
+    pub work_to_best: Option<usize>,
+}
+
+/// A cost within this share of the best counts as reached.
+const REACHED: f64 = 0.01;
+
+/// Runs every optimiser from the study's start, with the weights of a first fit's end so that all minimise the same cost.
+///
+/// # Errors
+/// The study cannot be fitted at all.
+pub fn courses(
+    compiled: &Compiled,
+    records: &[&Record],
+    budget: usize,
+    seed: u64,
+) -> Result<Courses, crate::diagnostics::Diagnostic> {
+    let study = &compiled.study;
+    let fitted = fit(compiled, records, &Settings::default(), &mut |_| Control::Continue)?;
+    let start: Vec<f64> = study.parameters.iter().map(|parameter| parameter.start).collect();
+    let bounds = Bounds::new(
+        study.parameters.iter().map(|parameter| parameter.lower).collect(),
+        study.parameters.iter().map(|parameter| parameter.upper).collect(),
+    );
+    let mut found = Vec::new();
+    for optimiser in Optimiser::ALL {
+        let mut problem = problem(compiled, records, &fitted.weighting)?;
+        let course = match optimiser {
+            Optimiser::LevenbergMarquardt => gauss_newton(&mut problem, &start, &bounds, budget),
+            other => search(other, &mut problem, &start, &bounds, budget, seed),
+        };
+        found.push((optimiser, course));
+    }
+    let best = found.iter().map(|(_, course)| course.cost).fold(f64::INFINITY, f64::min);
+    Ok(Courses {
+        study: study.name.clone(),
+        variant: study.variant.clone(),
+        parameters: study.parameters.iter().map(|parameter| parameter.name.clone()).collect(),
+        budget,
+        courses: found.into_iter().map(|(optimiser, course)| finished(optimiser, course, best)).collect(),
+    })
+}
+
+fn finished(optimiser: Optimiser, course: Search, best: f64) -> Course {
+    let reached = course.history.iter().find(|(_, cost)| *cost <= (1.0 + REACHED) * best);
+    Course {
+        optimiser: optimiser.name().to_owned(),
+        cost: course.cost,
+        converged: course.converged,
+        work_to_best: reached.map(|(work, _)| *work),
+        history: course.history,
+    }
+}
+
+fn problem<'a>(
+    compiled: &'a Compiled,
+    records: &[&'a Record],
+    weighting: &Weighting,
+) -> Result<Problem<'a>, crate::diagnostics::Diagnostic> {
+    let filters = prefilters(compiled, records)?;
+    Ok(Problem::new(compiled, records.to_vec(), filters, weighting.weights.clone()))
+}
+
+/// Levenberg-Marquardt with its work counted like that of the others.
+fn gauss_newton<P: LeastSquares>(problem: &mut P, start: &[f64], bounds: &Bounds, budget: usize) -> Search {
+    let columns = start.len();
+    let work = |evaluations: usize, iterations: usize| evaluations + columns * (iterations + 1);
+    let mut history = Vec::new();
+    let outcome = levenberg_marquardt(problem, start, bounds, &Options::default(), &mut |progress| {
+        let done = work(progress.evaluations, progress.iteration);
+        history.push((done, progress.cost));
+        if done >= budget { Control::Stop } else { Control::Continue }
+    });
+    match outcome {
+        Ok(estimate) => {
+            history.insert(0, (work(1, 0), estimate.cost_history[0]));
+            let evaluations = estimate.residual_evaluations + estimate.gradient_evaluations;
+            history.push((work(evaluations, estimate.iterations), estimate.cost));
+            Search { converged: estimate.stop_reason.converged(), theta: estimate.theta, cost: estimate.cost, history }
+        }
+        Err(_) => Search { theta: start.to_vec(), cost: f64::INFINITY, history, converged: false },
+    }
+}

@@ -1,0 +1,44 @@
+//! `ident optimisers STUDY`
+
+use super::output::write_whole;
+use super::session::Session;
+use super::{Failed, Format, StudyArguments};
+use crate::analyse::courses;
+use crate::report;
+use crate::simulation::Record;
+use crate::study::Role;
+use std::path::PathBuf;
+
+#[derive(clap::Args, Debug)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    study: StudyArguments,
+    /// Allowed work per optimiser, in simulations of all records
+    #[arg(long, default_value_t = 400)]
+    budget: usize,
+    /// Seed of the optimisers that draw
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Write the cost over the work as SVG
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
+    let study = &arguments.study;
+    super::set_threads(study.threads)?;
+    let session = Session::open(&study.study, study.format)?;
+    let compiled = session.compile(&study.variant)?;
+    let records = session.records(&compiled.study, study)?;
+    let estimation: Vec<&Record> = records.iter().filter(|record| record.role == Role::Estimation).collect();
+    let result = courses(&compiled, &estimation, arguments.budget, arguments.seed)
+        .map_err(|diagnostic| session.fail(&[diagnostic]))?;
+    if let Some(path) = &arguments.figure {
+        write_whole(path, &report::figure::courses(&result))?;
+    }
+    match study.format {
+        Format::Text => print!("{}", report::terminal::courses(&result)),
+        Format::Json => println!("{}", super::output::json(report::json::courses(&result))?),
+    }
+    Ok(())
+}

@@ -1,0 +1,79 @@
+//! Pictures of the cost: over the work of optimisers, and along parameters.
+
+use crate::analyse::{Courses, CutCurve, Cuts};
+use crate::report::chart::{Axis, Mark, Plot, Style, escape};
+use crate::report::figure::framed;
+
+const WIDTH: f64 = 900.0;
+const COURSES_HEIGHT: f64 = 430.0;
+/// Of one diagram of a cut, two beside each other.
+const CUT: (f64, f64) = (450.0, 260.0);
+const TOP: f64 = 40.0;
+
+/// Best cost so far (logarithm, relative to the start's) over simulations.
+pub fn courses(courses: &Courses) -> String {
+    let start = courses.courses.iter().filter_map(|course| course.history.first()).map(|(_, cost)| *cost);
+    let first = start.fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+    let mut marks = Vec::new();
+    for (index, course) in courses.courses.iter().enumerate() {
+        let (mut x, mut y): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+        for (work, cost) in &course.history {
+            // Steps: the best stays the best until a better one is found.
+            if let Some(&last) = y.last() {
+                x.push(*work as f64);
+                y.push(last);
+            }
+            x.push(*work as f64);
+            y.push((cost / first).log10());
+        }
+        marks.push(Mark::Line { x: x.into(), y: y.into(), style: Style::Variant(index), name: &course.optimiser });
+    }
+    let plot = Plot {
+        width: WIDTH,
+        height: COURSES_HEIGHT - TOP,
+        x_label: "simulations".to_owned(),
+        y_label: "cost, powers of ten below the start".to_owned(),
+        marks,
+        legend: true,
+        x_axis: None,
+        y_axis: None,
+    };
+    let title = format!("Optimisers on {}, {} parameters", courses.study, courses.parameters.len());
+    framed(WIDTH, COURSES_HEIGHT, &title, &format!("<g transform=\"translate(0 {TOP})\">{}</g>", plot.group()))
+}
+
+/// Discrepancy along every parameter, the others held at the estimate.
+pub fn cuts(cuts: &Cuts) -> String {
+    let mut content = String::new();
+    for (index, cut) in cuts.parameters.iter().enumerate() {
+        let name = |curve: &CutCurve| {
+            let band = curve.band.strip_prefix("up to ").unwrap_or("all");
+            format!("{band} {:.0e}", curve.tolerance)
+        };
+        let names: Vec<String> = cut.curves.iter().map(name).collect();
+        let marks = cut
+            .curves
+            .iter()
+            .zip(&names)
+            .enumerate()
+            .map(|(k, (curve, name))| {
+                let (x, y) = (cut.values.as_slice().into(), curve.discrepancy.as_slice().into());
+                Mark::Line { x, y, style: Style::Variant(k), name }
+            })
+            .collect();
+        let plot = Plot {
+            width: CUT.0,
+            height: CUT.1,
+            x_label: format!("{} [{}]", cut.parameter, cut.unit),
+            y_label: "discrepancy [%]".to_owned(),
+            marks,
+            legend: true,
+            x_axis: Axis::around(&cut.values, 0.0, 6),
+            y_axis: None,
+        };
+        let (x, y) = ((index % 2) as f64 * CUT.0, TOP + (index / 2) as f64 * CUT.1);
+        content.push_str(&format!("<g transform=\"translate({x} {y})\">{}</g>", plot.group()));
+    }
+    let height = TOP + cuts.parameters.len().div_ceil(2) as f64 * CUT.1;
+    framed(WIDTH, height, &format!("Cuts of the cost of {}", escape(&cuts.study)), &content)
+}
