@@ -13,6 +13,12 @@ use crate::expression::{Graph, Node, Symbol};
 use crate::syntax::Name;
 use std::collections::{HashMap, HashSet};
 
+/// Findings with suggestions of similar names.
+const MOST_SUGGESTIONS: usize = 200;
+
+/// Definitions and parts of expressions nested deeper are refused.
+pub(super) const DEEPEST_EVALUATION: usize = 500;
+
 /// Where an expression stands; decides what its names mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scope {
@@ -138,6 +144,8 @@ pub(super) struct Checker<'a> {
     unknown: HashSet<String>,
     memo: HashMap<Key<'a>, Slot>,
     stack: Vec<Key<'a>>,
+    /// Expressions being evaluated, one within the other.
+    pub depth: usize,
 }
 
 impl<'a> Checker<'a> {
@@ -179,6 +187,7 @@ impl<'a> Checker<'a> {
             unknown: HashSet::new(),
             memo: HashMap::new(),
             stack: Vec::new(),
+            depth: 0,
         }
     }
 
@@ -352,6 +361,10 @@ impl<'a> Checker<'a> {
     /// All names an expression of the study can start with, in order of declaration.
     pub fn all_names(&self) -> Vec<&'a str> {
         let declared = self.declared;
+        // Among so many findings nobody looks for a misspelt word.
+        if self.diagnostics.len() > MOST_SUGGESTIONS {
+            return Vec::new();
+        }
         let mut names: Vec<&'a str> = Vec::new();
         names.extend(declared.constants.iter().map(|item| item.name.text.as_str()));
         names.extend(declared.inputs.iter().map(|item| item.name.text.as_str()));

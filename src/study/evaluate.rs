@@ -1,6 +1,6 @@
 //! Expressions to nodes, with the dimension of every part checked.
 
-use super::checker::{Checker, Scope};
+use super::checker::{Checker, DEEPEST_EVALUATION, Scope};
 use super::units::read_unit;
 use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::expression::{Binary, Node};
@@ -36,7 +36,17 @@ pub(super) fn literal(expression: &Expression) -> Option<(f64, Option<&Name>)> {
 impl<'a> Checker<'a> {
     /// The value of `expression`; `None` after a finding has been reported.
     pub fn evaluate(&mut self, expression: &'a Expression, scope: Scope) -> Option<Typed> {
-        let value = self.evaluate_kind(expression, scope)?;
+        if self.depth >= DEEPEST_EVALUATION {
+            let message = format!("more than {DEEPEST_EVALUATION} definitions depend on each other");
+            let diagnostic = Diagnostic::error(Code::TOO_DEEP, message)
+                .label(expression.span, "while following this one")
+                .help("give one of them as a number");
+            return self.fail(diagnostic, scope);
+        }
+        self.depth += 1;
+        let value = self.evaluate_kind(expression, scope);
+        self.depth -= 1;
+        let value = value?;
         let is_calculated = matches!(expression.kind, ExpressionKind::Binary { .. } | ExpressionKind::Call { .. });
         match self.graph.constant_value(value.node) {
             Some(number) if is_calculated && !number.is_finite() && !self.may_be_undefined(&expression.kind) => {

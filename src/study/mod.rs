@@ -63,6 +63,21 @@ pub fn flat_text(loaded: &Loaded, variant: Option<&str>) -> Result<String, Vec<D
     Ok(print(&Tree { items }))
 }
 
+/// Does with a text all that is done before data are needed: reading, formatting, checking with every variant, showing
+/// the findings. For tests with texts that nobody would write; returns the number of findings.
+pub fn probe(text: &str) -> usize {
+    let loaded = load_text("probe", text);
+    let _ = crate::syntax::format(loaded.study_file(), text);
+    let mut findings = check(&loaded, None).map_or_else(|findings| findings, |checked| checked.warnings);
+    let variants = elaborate::elaborate(&loaded, None, &mut Vec::new()).variants;
+    for variant in variants.iter().take(3) {
+        findings.extend(check(&loaded, Some(&variant.text)).map_or_else(|more| more, |checked| checked.warnings));
+    }
+    let shown = &findings[..findings.len().min(100)];
+    crate::diagnostics::render(shown, &loaded.sources, false);
+    findings.len()
+}
+
 /// Checks a study with one of its variants (`None` or `base`: none).
 ///
 /// # Errors
@@ -70,6 +85,10 @@ pub fn flat_text(loaded: &Loaded, variant: Option<&str>) -> Result<String, Vec<D
 pub fn check(loaded: &Loaded, variant: Option<&str>) -> Result<Checked, Vec<Diagnostic>> {
     let mut findings = Vec::new();
     let flat = elaborate::elaborate(loaded, variant, &mut findings);
+    if flat.is_too_large {
+        findings.extend(loaded.diagnostics.iter().cloned());
+        return Err(findings);
+    }
     let declarations = declarations::collect(loaded, &flat, &mut findings);
     let mut checker = checker::Checker::new(loaded, &declarations, findings);
     let study = checker.study();

@@ -16,11 +16,16 @@ use super::load::Loaded;
 use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use crate::syntax::{Change, Expression, Item, ItemKind, LawDeclaration, ModelDeclaration, Name, TypeExpression};
 use scope::Scope;
-use std::collections::{BTreeMap, BTreeSet};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use table::table_law;
 
 /// More declarations than this are refused.
-const MOST_ITEMS: usize = 20_000;
+const MOST_ITEMS: usize = 10_000;
+
+/// Bytes of text written out, with something for every declaration: models and families may multiply each other.
+const MOST_TEXT: usize = 8 << 20;
+const TEXT_OF_A_DECLARATION: usize = 40;
 
 /// Items in order of declaration, without models, parts and families.
 pub(super) struct Flat {
@@ -32,6 +37,8 @@ pub(super) struct Flat {
     pub ports: Vec<PortCheck>,
     /// Names (without indices) of what could not be written out; reported already.
     pub broken: BTreeSet<String>,
+    /// The rest was not written out; reported.
+    pub is_too_large: bool,
     /// Declared variants in order, `base` not included.
     pub variants: Vec<Name>,
     /// The one that is applied.
@@ -104,6 +111,7 @@ pub(super) fn elaborate(loaded: &Loaded, variant: Option<&str>, diagnostics: &mu
 struct Elaborator<'t, 'd> {
     flat: Flat,
     diagnostics: &'d mut Vec<Diagnostic>,
+    reported: HashSet<(&'static str, Option<Span>)>,
     models: BTreeMap<&'t str, &'t ModelDeclaration>,
     /// Constants of the study, as written.
     constants: BTreeMap<String, Expression>,
@@ -112,7 +120,10 @@ struct Elaborator<'t, 'd> {
     /// Models being written out, the outermost first.
     stack: Vec<&'t str>,
     by_variant: bool,
-    is_too_large: bool,
+    /// What has been written out so far, in bytes of the text it comes from.
+    written: usize,
+    /// Values of constants in indices found so far.
+    numbers: RefCell<BTreeMap<String, Option<f64>>>,
 }
 
 impl<'t, 'd> Elaborator<'t, 'd> {
@@ -124,25 +135,27 @@ impl<'t, 'd> Elaborator<'t, 'd> {
             arguments: Vec::new(),
             ports: Vec::new(),
             broken: BTreeSet::new(),
+            is_too_large: false,
             variants: Vec::new(),
             variant: String::new(),
         };
         Elaborator {
             flat,
             diagnostics,
+            reported: HashSet::new(),
             models: BTreeMap::new(),
             constants: BTreeMap::new(),
             targets: BTreeSet::new(),
             stack: Vec::new(),
             by_variant: false,
-            is_too_large: false,
+            written: 0,
+            numbers: RefCell::default(),
         }
     }
 
+    /// A mistake within a model is told once, however often the model is used.
     fn report(&mut self, diagnostic: Diagnostic) {
-        // A mistake within a model is told once, however often the model is used.
-        let is_known = |known: &Diagnostic| known.code == diagnostic.code && known.span() == diagnostic.span();
-        if !self.diagnostics.iter().any(is_known) {
+        if self.reported.insert((diagnostic.code.text, diagnostic.span())) {
             self.diagnostics.push(diagnostic);
         }
     }
@@ -179,16 +192,12 @@ impl<'t, 'd> Elaborator<'t, 'd> {
 
     /// Writes out one declaration; what it becomes is appended to the flat items.
     fn expand(&mut self, mut item: Item, scope: &Scope) {
-        if self.is_too_large {
+        if self.flat.is_too_large {
             return;
         }
-        if self.flat.items.len() >= MOST_ITEMS {
-            self.is_too_large = true;
-            let message = format!("the study has more than {MOST_ITEMS} declarations when written out");
-            let diagnostic = Diagnostic::error(Code::TOO_LARGE, message)
-                .label(item.span, "the limit is reached here")
-                .help("make the families smaller, or use elastic bodies instead of chains of rigid ones");
-            return self.report(diagnostic);
+        self.written += item.span.end.saturating_sub(item.span.start) as usize + TEXT_OF_A_DECLARATION;
+        if self.flat.items.len() >= MOST_ITEMS || self.written >= MOST_TEXT {
+            return self.report_size(item.span);
         }
         match item.kind {
             ItemKind::Part { name, model, places, fields } => {
@@ -207,6 +216,20 @@ impl<'t, 'd> Elaborator<'t, 'd> {
                 }
             }
         }
+    }
+
+    fn report_size(&mut self, span: Span) {
+        if std::mem::replace(&mut self.flat.is_too_large, true) {
+            return;
+        }
+        let message = format!(
+            "written out, the study has more than {MOST_ITEMS} declarations or more than {} MB",
+            MOST_TEXT >> 20
+        );
+        let diagnostic = Diagnostic::error(Code::TOO_LARGE, message)
+            .label(span, "the limit is reached here")
+            .help("make the families smaller, or use elastic bodies instead of chains of rigid ones");
+        self.report(diagnostic);
     }
 
     /// Only what can be repeated may stand in a model or a family.
@@ -329,11 +352,12 @@ impl<'t, 'd> Elaborator<'t, 'd> {
 
     /// A written name has a dot only where it adds to a part.
     fn check_dotted_names(&mut self) {
+        let parts: BTreeSet<&str> = self.flat.parts.iter().map(|part| part.text.as_str()).collect();
         let mut wrong: Vec<(Name, String)> = Vec::new();
         let names = self.flat.items.iter().filter_map(|item| variants::declared_name(&item.item.kind));
         for name in names.chain(&self.flat.parts) {
             if let Some((owner, _)) = name.text.rsplit_once('.')
-                && !self.flat.parts.iter().any(|part| part.text == owner)
+                && !parts.contains(owner)
             {
                 wrong.push((name.clone(), owner.to_owned()));
             }

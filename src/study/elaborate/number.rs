@@ -64,10 +64,16 @@ impl Elaborator<'_, '_> {
             Some(Argument::Missing) => return Err(NoNumber::Unsuitable),
             None => {}
         }
-        match self.constants.get(name) {
-            Some(value) if depth < DEEPEST => self.number(value, &Scope::default(), depth + 1),
-            _ => Err(NoNumber::Name(name.to_owned())),
+        let unknown = || NoNumber::Name(name.to_owned());
+        if let Some(known) = self.numbers.borrow().get(name) {
+            return known.ok_or_else(unknown);
         }
+        let value = match self.constants.get(name) {
+            Some(value) if depth < DEEPEST => self.number(value, &Scope::default(), depth + 1),
+            _ => return Err(unknown()),
+        };
+        self.numbers.borrow_mut().insert(name.to_owned(), value.as_ref().ok().copied());
+        value
     }
 
     /// The value of a dimensionless expression of numbers, variables, constants and arguments.

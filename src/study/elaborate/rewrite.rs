@@ -250,6 +250,13 @@ impl Elaborator<'_, '_> {
                 match inlined.map(Meaning::Value).or_else(|| self.meaning(name, scope)) {
                     Some(Meaning::Path(path)) => name.text = path,
                     Some(Meaning::Value(value)) => {
+                        let text = value.span.end.saturating_sub(value.span.start) as usize;
+                        self.written += text;
+                        if self.written >= super::MOST_TEXT {
+                            self.report_size(span);
+                            expression.kind = ExpressionKind::Invalid;
+                            return false;
+                        }
                         let is_number = literal(&value).is_some();
                         expression.kind = value.kind;
                         expression.span = if is_number { span } else { value.span };
