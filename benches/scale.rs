@@ -4,54 +4,12 @@
 //! process after compilation.
 
 mod generated;
+mod support;
 
 use ident::integrate::Dynamics;
-use ident::simulation::{Compiled, Gradient, Record, prepare, simulate};
-use ident::study::{check, load_text};
+use ident::simulation::{Gradient, simulate};
 use ident::tape::Bound;
-use std::time::{Duration, Instant};
-
-fn median(mut times: Vec<Duration>) -> f64 {
-    times.sort_unstable();
-    times[times.len() / 2].as_secs_f64()
-}
-
-fn timed<T>(repetitions: usize, mut work: impl FnMut() -> T) -> (f64, T) {
-    let mut times = Vec::new();
-    let mut last = None;
-    for _ in 0..repetitions {
-        let begin = Instant::now();
-        last = Some(work());
-        times.push(begin.elapsed());
-    }
-    (median(times), last.expect("at least one repetition"))
-}
-
-fn compile(text: &str) -> Compiled {
-    let loaded = load_text("generated.ident", text);
-    let complain = |findings: &[ident::diagnostics::Diagnostic]| -> ! {
-        panic!("{}", ident::diagnostics::render(findings, &loaded.sources, false))
-    };
-    let checked = check(&loaded, None).unwrap_or_else(|findings| complain(&findings));
-    Compiled::new(checked.study).unwrap_or_else(|findings| complain(&findings))
-}
-
-/// A record of `duration` seconds, 100 samples per second; the measured values do not matter.
-fn record(compiled: &Compiled, duration: f64) -> Record {
-    let folder = tempfile::tempdir().expect("a folder");
-    let names: Vec<String> =
-        compiled.study.measures.iter().map(|m| format!("{} [{}]", m.name, m.unit.symbol)).collect();
-    let mut text = format!("t [s],{}\n", names.join(","));
-    for k in 0..=(100.0 * duration) as usize {
-        let t = k as f64 / 100.0;
-        let values: Vec<String> = names.iter().enumerate().map(|(i, _)| format!("{}", (t + i as f64).sin())).collect();
-        text += &format!("{t},{}\n", values.join(","));
-    }
-    std::fs::write(folder.path().join("run.csv"), text).expect("writable folder");
-    let (mut records, findings) = prepare(&compiled.study, folder.path(), &[]);
-    assert!(findings.iter().all(|finding| !finding.is_error()), "{findings:?}");
-    records.remove(0)
-}
+use support::{compile, record, timed};
 
 fn resident_megabytes() -> f64 {
     let status = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
@@ -75,7 +33,7 @@ fn family(name: &str, generate: fn(usize) -> String) {
     for size in [10, 20, 40, 80, 160, 320] {
         let text = generate(size);
         let (seconds, compiled) = timed(3, || compile(&text));
-        let record = record(&compiled, 1.0);
+        let record = record(&compiled, 1.0, 100.0);
         let theta: Vec<f64> = compiled.study.parameters.iter().map(|p| p.start).collect();
         let mut bound = Bound::new(&compiled.model, &record.inputs, &theta);
         let mut y = vec![0.1; compiled.model.dimension()];
@@ -113,7 +71,7 @@ fn vehicle() {
         compiled.system.states.len(),
         compiled.system.algebraic.len()
     );
-    let record = record(&compiled, 13.0);
+    let record = record(&compiled, 13.0, 100.0);
     let theta: Vec<f64> = compiled.study.parameters.iter().map(|p| p.start).collect();
     let (nominal, trajectory) =
         timed(1, || simulate(&compiled, &record, &theta, Gradient::None).expect("a simulation"));

@@ -35,3 +35,19 @@ fn a_vehicle_with_closed_loops_compiles() {
     assert!(system.warnings.is_empty());
     assert_eq!(model.parameter_count(), 34);
 }
+
+#[path = "../benches/generated/problems.rs"]
+mod problems;
+
+/// The reference problems as bodies, joints and laws have the size of their definition.
+#[test]
+fn reference_problems_compile() {
+    for (text, states, parameters, measures) in [(problems::p1(1e-6), 6, 10, 4), (problems::p2(1e-6), 88, 34, 33)] {
+        let (system, model) = compiled(&text);
+        assert_eq!(
+            (model.state_count(), model.parameter_count(), model.output_count()),
+            (states, parameters, measures)
+        );
+        assert!(system.algebraic.is_empty());
+    }
+}

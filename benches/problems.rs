@@ -1,0 +1,143 @@
+//! P1 and P2 as studies: one call of the rates, nominal run and gradient at the tolerance that reaches the error asked for.
+//!
+//! `cargo bench --bench problems` prints achieved errors (against a run of the same study at tolerance 1e-12) and medians. The
+//! peers' figures are those of `../shared/bench`, measured on another occasion: ratios across machines are rough.
+
+#[path = "generated/problems.rs"]
+mod problems;
+mod support;
+
+use ident::integrate::Dynamics;
+use ident::simulation::{Gradient, Trajectory, simulate};
+use ident::tape::Bound;
+use support::{compile, record, timed};
+
+/// errY of the problems' definition.
+fn error_of_outputs(own: &Trajectory, reference: &Trajectory) -> f64 {
+    let channels = own.channels.iter().zip(&reference.channels);
+    let errors = channels.map(|(own, reference)| {
+        let size = reference.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        own.iter().zip(reference).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())) / size
+    });
+    errors.fold(0.0, f64::max)
+}
+
+/// errS of the problems' definition.
+fn error_of_sensitivities(own: &Trajectory, reference: &Trajectory, theta: &[f64]) -> f64 {
+    let mut worst: f64 = 0.0;
+    for (own, reference) in own.gradient.iter().zip(&reference.gradient) {
+        let samples = own.len() / theta.len();
+        let size = |j: usize| {
+            reference[j * samples..(j + 1) * samples].iter().fold(0.0_f64, |m, v| m.max((v * theta[j]).abs()))
+        };
+        let largest = (0..theta.len()).map(size).fold(0.0, f64::max);
+        for j in 0..theta.len() {
+            let range = j * samples..(j + 1) * samples;
+            let differences = own[range.clone()].iter().zip(&reference[range]).map(|(a, b)| ((a - b) * theta[j]).abs());
+            worst = worst.max(differences.fold(0.0, f64::max) / size(j).max(1e-3 * largest));
+        }
+    }
+    worst
+}
+
+struct Peers {
+    call: f64,
+    nominal: f64,
+    gradient: f64,
+}
+
+fn problem(name: &str, text: fn(f64) -> String, rate: f64, wanted: (f64, f64), peers: &Peers) {
+    let compiled = compile(&text(1e-12));
+    let record = record(&compiled, 10.0, rate);
+    let theta: Vec<f64> = compiled.study.parameters.iter().map(|p| p.start).collect();
+    let mut bound = Bound::new(&compiled.model, &record.inputs, &theta);
+    let n = compiled.model.dimension();
+    let (mut y, mut rates) = (vec![0.001; n], vec![0.0; n]);
+    let (call, ()) = timed(21, || {
+        for k in 0..1000 {
+            bound.explicit_rates(1.0 + 1e-4 * f64::from(k), &y, &mut rates);
+            y[0] = 0.001 + 1e-12 * rates[0];
+        }
+    });
+    println!("{name}: {n} states, {} parameters; instructions {:?}", theta.len(), compiled.model.instruction_counts());
+    println!("  rates: {:.3} us per call, peer {} us: {:.2} times", call * 1e3, peers.call, call * 1e3 / peers.call);
+    let reference = simulate(&compiled, &record, &theta, Gradient::AllParameters).expect("a reference");
+    for method in ["automatic", "bdf"] {
+        let nominal = first_good(
+            text,
+            method,
+            |compiled| {
+                let (time, run) = timed(5, || simulate(compiled, &record, &theta, Gradient::None).expect("a run"));
+                (error_of_outputs(&run, &reference), time, run)
+            },
+            wanted.0,
+        );
+        if let Some((tolerance, error, time, run)) = nominal {
+            println!(
+                "  nominal, {method}: {time:.4} s at tolerance {tolerance:.0e}, error {error:.1e}, {} steps {}; peer {} s: {:.2} times",
+                run.work.steps,
+                run.work.method,
+                peers.nominal,
+                time / peers.nominal
+            );
+        }
+        if method == "bdf" {
+            continue;
+        }
+        let gradient = first_good(
+            text,
+            method,
+            |compiled| {
+                let (time, run) =
+                    timed(3, || simulate(compiled, &record, &theta, Gradient::AllParameters).expect("a run"));
+                (error_of_sensitivities(&run, &reference, &theta), time, run)
+            },
+            wanted.1,
+        );
+        if let Some((tolerance, error, time, run)) = gradient {
+            let plain = compile(&with_method(text, tolerance, method));
+            let (nominal, _) = timed(5, || simulate(&plain, &record, &theta, Gradient::None).expect("a run"));
+            println!(
+                "  gradient, {method}: {time:.4} s at tolerance {tolerance:.0e}, error {error:.1e}, {} steps; peer {} s: {:.2} times; {:.1} nominal runs",
+                run.work.steps,
+                peers.gradient,
+                time / peers.gradient,
+                time / nominal
+            );
+        }
+    }
+}
+
+fn with_method(text: fn(f64) -> String, tolerance: f64, method: &str) -> String {
+    text(tolerance).replace("solver { ", &format!("solver {{ method = {method}, "))
+}
+
+/// The loosest tolerance whose run has at most the wanted error: tolerance, error, time, run.
+fn first_good(
+    text: fn(f64) -> String,
+    method: &str,
+    mut run: impl FnMut(&ident::simulation::Compiled) -> (f64, f64, Trajectory),
+    wanted: f64,
+) -> Option<(f64, f64, f64, Trajectory)> {
+    for half_decade in 6..=20 {
+        let tolerance = 10f64.powf(-0.5 * f64::from(half_decade));
+        let compiled = compile(&with_method(text, tolerance, method));
+        let (error, time, trajectory) = run(&compiled);
+        if error <= wanted {
+            return Some((tolerance, error, time, trajectory));
+        }
+    }
+    println!("  {method}: no tolerance reaches {wanted:.0e}");
+    None
+}
+
+fn main() {
+    let wanted = std::env::args().nth(1).filter(|argument| !argument.starts_with('-'));
+    let runs = |name: &str| wanted.as_deref().is_none_or(|wanted| wanted == name);
+    if runs("p1") {
+        problem("P1", problems::p1, 1000.0, (1e-6, 1e-4), &Peers { call: 0.22, nominal: 0.035, gradient: 0.155 });
+    }
+    if runs("p2") {
+        problem("P2", problems::p2, 200.0, (1e-6, 4e-4), &Peers { call: 1.19, nominal: 0.19, gradient: 14.0 });
+    }
+}
