@@ -1,6 +1,6 @@
 //! Stable text of a study's mechanics (`ident compile --emit tree|model|equations`). All numbers SI.
 
-use super::system::{StartEquation, System};
+use super::system::{StartEquation, System, VariableKind};
 use super::topology::{Tree, spanning_tree};
 use crate::diagnostics::Diagnostic;
 use crate::expression::{Graph, Node, Printer};
@@ -171,9 +171,24 @@ pub fn emit_model(study: &Study, system: &System) -> String {
         let unit = &criterion.unit.symbol;
         let _ = writeln!(text, "criterion {} [{unit}] = {statistic}({value}) in {manoeuvre}", criterion.name);
     }
+    let closing: Vec<&str> =
+        study.joints.iter().filter(|joint| joint.closes_loop).map(|joint| joint.name.as_str()).collect();
+    let velocities = system.states.iter().filter(|state| state.kind == VariableKind::Velocity).count();
+    let loops = match closing.as_slice() {
+        [] => String::new(),
+        [one] => format!(", one loop closed by {one}"),
+        several => format!(", {} loops closed by {}", several.len(), several.join(", ")),
+    };
     let _ = writeln!(
         text,
-        "\n{} states, {} algebraic variables, {} parameters, {} outputs",
+        "\n{} bodies, {} joints{loops}, {} degrees of freedom",
+        study.bodies.len(),
+        study.joints.len(),
+        velocities.saturating_sub(system.hidden.len())
+    );
+    let _ = writeln!(
+        text,
+        "{} states, {} algebraic variables, {} parameters, {} outputs",
         system.states.len(),
         system.algebraic.len(),
         system.parameters.len(),
