@@ -5,15 +5,21 @@
 //!
 //! A joint is a list of motion axes; every axis is one link of the spanning tree (`topology`). Motion goes outwards
 //! (`kinematics`), forces come from the elements (`forces`), accelerations from the articulated-body algorithm
-//! (`articulated`), all on symbolic scalars, so that whatever is structurally zero vanishes.
+//! (`articulated`), all on symbolic scalars, so that whatever is structurally zero vanishes. Joints that close loops are rows of
+//! constraints (`loops`), of which those count that are independent near the start (`assembly`), with two multipliers each
+//! (`multipliers`); what joints transmit follows from the same pass (`reactions`).
 
 mod articulated;
+mod assemble;
 mod assembly;
 mod derive;
 mod emit;
 mod forces;
+mod inertia;
 mod kinematics;
 mod loops;
+mod multipliers;
+mod reactions;
 mod scale;
 mod starts;
 mod system;

@@ -1,0 +1,255 @@
+//! The system from its parts: states, rates, measures, starts.
+
+use super::articulated::Accelerated;
+use super::kinematics::FrameMotion;
+use super::multipliers::{Loops, algebraic_part};
+use super::scale::typical_magnitude;
+use super::starts::starts;
+use super::system::{Output, StartEquation, System, Variable, VariableKind};
+use super::topology::{Axis, Coordinate, Tree};
+use crate::diagnostics::{Code, Diagnostic, Span};
+use crate::expression::vector::Vector;
+use crate::expression::{Graph, Node, Symbol};
+use crate::quantities::Dimension;
+use crate::study::{ReactionQuantity, Study};
+use std::collections::HashMap;
+
+/// How fast a quaternion whose length has drifted returns to length one, 1/s: slow against every motion, so that it costs no
+/// step, and enough to make the length of a quaternion at rest determined.
+const QUATERNION_RETURN: f64 = 1.0;
+
+pub(super) fn assemble(
+    mut graph: Graph,
+    study: &Study,
+    tree: &Tree,
+    frames: &[FrameMotion],
+    accelerated: &[Accelerated],
+    meaning: &HashMap<Symbol, Node>,
+    (loops, hidden, reactions): (Loops, Vec<Node>, Vec<(ReactionQuantity, Node)>),
+) -> Result<System, Vec<Diagnostic>> {
+    let moving: Vec<usize> = tree.links_of_joint.iter().flatten().copied().collect();
+    let projection = loops.projection(&mut graph, tree, frames);
+    let states = state_variables(study, tree, &moving);
+    let mut rates: Vec<Node> =
+        moving.iter().flat_map(|&link| position_rates(&mut graph, tree, link, &projection)).collect();
+    let free = moving.iter().filter(|&&link| tree.links[link].free_symbols().is_some());
+    rates.extend(free.map(|&link| accelerated[link].acceleration));
+    let derivatives: Vec<Node> = study.states.iter().map(|state| state.derivative).collect();
+    rates.extend(graph.substitute(&derivatives, meaning));
+
+    let values: Vec<Node> = study.outputs().map(|(_, value, _)| value).collect();
+    let values = graph.substitute(&values, meaning);
+    let name_and_value = |((name, ..), value): ((&str, Node, Span), Node)| Output { name: name.to_owned(), value };
+    let outputs: Vec<Output> = study.outputs().zip(values).map(name_and_value).collect();
+    let probes = probes(&mut graph, study, meaning);
+    let starts = all_starts(&mut graph, study, &states, meaning)?;
+    let (algebraic, constraints) = algebraic_part(&mut graph, &loops, &reactions);
+    let index_two = (0..algebraic.len()).map(|i| i < 2 * loops.rows.len()).collect();
+
+    let system = System {
+        graph,
+        time: study.time,
+        states,
+        rates,
+        algebraic,
+        constraints,
+        hidden,
+        index_two,
+        warnings: loops.warnings,
+        parameters: study.parameters.iter().map(|p| p.symbol).collect(),
+        parameter_names: study.parameters.iter().map(|p| p.name.clone()).collect(),
+        outputs,
+        probes,
+        starts,
+    };
+    refuse_unknown_symbols(study, tree, &system)?;
+    Ok(system)
+}
+
+/// Rates of the positions that belong to a link.
+fn position_rates(graph: &mut Graph, tree: &Tree, link: usize, projection: &[Node]) -> Vec<Node> {
+    match tree.links[link].coordinate {
+        Coordinate::Free { symbols, .. } => {
+            let velocity = graph.variable(symbols.velocity);
+            vec![graph.add(velocity, projection[link])]
+        }
+        Coordinate::Rotation { symbols, component: 0 } => {
+            let rate = |graph: &mut Graph, k: usize| {
+                let own = graph.variable(symbols.velocity[k]);
+                graph.add(own, projection[link + k])
+            };
+            let rates: Vector = std::array::from_fn(|k| rate(graph, k));
+            quaternion_rates(graph, symbols.quaternion, rates)
+        }
+        Coordinate::Rotation { .. } | Coordinate::Prescribed { .. } | Coordinate::Weld => vec![],
+    }
+}
+
+/// `q' = q (0, w) / 2 + k (1 - |q|^2) q`.
+fn quaternion_rates(graph: &mut Graph, quaternion: [Symbol; 4], rates: Vector) -> Vec<Node> {
+    let [w, x, y, z] = quaternion.map(|symbol| graph.variable(symbol));
+    let [a, b, c] = rates;
+    let mut sum = |terms: [(Node, Node, f64); 3]| {
+        let products = terms.map(|(p, q, sign)| {
+            let factor = graph.constant(0.5 * sign);
+            let product = graph.multiply(p, q);
+            graph.multiply(factor, product)
+        });
+        let partial = graph.add(products[0], products[1]);
+        graph.add(partial, products[2])
+    };
+    let turning = [
+        sum([(x, a, -1.0), (y, b, -1.0), (z, c, -1.0)]),
+        sum([(w, a, 1.0), (y, c, 1.0), (z, b, -1.0)]),
+        sum([(w, b, 1.0), (z, a, 1.0), (x, c, -1.0)]),
+        sum([(w, c, 1.0), (x, b, 1.0), (y, a, -1.0)]),
+    ];
+    let mut excess = graph.constant(QUATERNION_RETURN);
+    for component in [w, x, y, z] {
+        let square = graph.multiply(component, component);
+        let weight = graph.constant(QUATERNION_RETURN);
+        let square = graph.multiply(weight, square);
+        excess = graph.subtract(excess, square);
+    }
+    [w, x, y, z]
+        .into_iter()
+        .zip(turning)
+        .map(|(component, turning)| {
+            let returning = graph.multiply(excess, component);
+            graph.add(turning, returning)
+        })
+        .collect()
+}
+
+fn state_variables(study: &Study, tree: &Tree, moving: &[usize]) -> Vec<Variable> {
+    let variable = |symbol: Symbol, dimension: Dimension, kind: VariableKind, reference: f64| Variable {
+        symbol,
+        name: study.graph.symbol_name(symbol).to_owned(),
+        kind,
+        dimension,
+        scale: typical_magnitude(dimension, kind),
+        reference,
+    };
+    let mut positions = Vec::new();
+    let mut velocities = Vec::new();
+    for &link in moving {
+        let link = &tree.links[link];
+        let length = i8::from(matches!(link.axis, Axis::Shift(_)));
+        let position = Dimension { length, ..Dimension::default() };
+        let velocity = Dimension { length, time: -1, ..Dimension::default() };
+        match link.coordinate {
+            Coordinate::Free { symbols, .. } => {
+                positions.push(variable(symbols.position, position, VariableKind::Position, 0.0));
+                velocities.push(variable(symbols.velocity, velocity, VariableKind::Velocity, 0.0));
+            }
+            Coordinate::Rotation { symbols, component } => {
+                if component == 0 {
+                    positions.extend(symbols.quaternion.iter().enumerate().map(|(i, &symbol)| {
+                        variable(symbol, position, VariableKind::Position, f64::from(u8::from(i == 0)))
+                    }));
+                }
+                velocities.push(variable(symbols.velocity[component], velocity, VariableKind::Velocity, 0.0));
+            }
+            Coordinate::Prescribed { .. } | Coordinate::Weld => {}
+        }
+    }
+    let laws = study.states.iter().map(|state| variable(state.symbol, state.dimension, VariableKind::Law, 0.0));
+    positions.into_iter().chain(velocities).chain(laws).collect()
+}
+
+fn probes(graph: &mut Graph, study: &Study, meaning: &HashMap<Symbol, Node>) -> Vec<Output> {
+    let mut probes = Vec::new();
+    for place in &study.places {
+        for (quantity, node) in &place.probes {
+            let name = format!("{}.{}", place.name, format!("{quantity:?}").to_lowercase());
+            probes.push(Output { name, value: *node });
+        }
+    }
+    let values: Vec<Node> = probes.iter().map(|probe| probe.value).collect();
+    for (probe, value) in probes.iter_mut().zip(graph.substitute(&values, meaning)) {
+        probe.value = value;
+    }
+    probes
+}
+
+fn all_starts(
+    graph: &mut Graph,
+    study: &Study,
+    states: &[Variable],
+    meaning: &HashMap<Symbol, Node>,
+) -> Result<Vec<Vec<StartEquation>>, Vec<Diagnostic>> {
+    let initial: Vec<Node> = study.states.iter().map(|state| state.initial).collect();
+    let initial = graph.substitute(&initial, meaning);
+    let initial: HashMap<Symbol, Node> = study.states.iter().map(|state| state.symbol).zip(initial).collect();
+    let mut result = Vec::new();
+    let mut errors = Vec::new();
+    for (name, start, span) in study.starts() {
+        let values: Vec<Node> = start.overrides.iter().map(|&(_, value)| value).collect();
+        let values = graph.substitute(&values, meaning);
+        let overrides: Vec<(Symbol, Node)> = start.overrides.iter().map(|&(symbol, _)| symbol).zip(values).collect();
+        match starts(graph, states, (&name, start.base, span), &initial, &overrides) {
+            Ok(equations) => result.push(equations),
+            Err(found) => errors.extend(found),
+        }
+    }
+    if errors.is_empty() { Ok(result) } else { Err(errors) }
+}
+
+/// Everything that is left must be time, a state or a parameter.
+fn refuse_unknown_symbols(study: &Study, tree: &Tree, system: &System) -> Result<(), Vec<Diagnostic>> {
+    let mut known: std::collections::HashSet<Symbol> = system.states.iter().map(|state| state.symbol).collect();
+    known.extend(&system.parameters);
+    known.extend(system.algebraic.iter().map(|variable| variable.symbol));
+    known.insert(system.time);
+    let mut roots: Vec<Node> = system.rates.clone();
+    roots.extend(system.outputs.iter().map(|output| output.value));
+    roots.extend(system.starts.iter().flatten().filter_map(|equation| match equation {
+        StartEquation::Value(node) => Some(*node),
+        StartEquation::Equilibrium => None,
+    }));
+    if system.graph.symbols_of(&roots).iter().all(|symbol| known.contains(symbol)) {
+        return Ok(());
+    }
+    let mut errors = Vec::new();
+    let mut check = |what: &str, node: Node, span: Span| {
+        for symbol in system.graph.symbols_of(&[node]).into_iter().filter(|symbol| !known.contains(symbol)) {
+            let name = system.graph.symbol_name(symbol);
+            errors.push(
+                Diagnostic::error(Code::UNKNOWN_QUANTITY, format!("{what} depends on `{name}`, which nothing defines"))
+                    .label(span, "used here")
+                    .help("identify it as a parameter, declare it as a constant, or attach it to an element"),
+            );
+        }
+    };
+    let state_span = |symbol: Symbol| {
+        let law = study.states.iter().find(|state| state.symbol == symbol).map(|state| state.span);
+        let joint = || {
+            let link = tree.links.iter().find(|link| match link.coordinate {
+                Coordinate::Free { symbols, .. } => symbols.position == symbol || symbols.velocity == symbol,
+                Coordinate::Rotation { symbols, .. } => {
+                    symbols.quaternion.contains(&symbol) || symbols.velocity.contains(&symbol)
+                }
+                Coordinate::Prescribed { .. } | Coordinate::Weld => false,
+            });
+            link.map(|link| study.joints[link.joint].span)
+        };
+        law.or_else(joint).unwrap_or_default()
+    };
+    let spans: Vec<Span> = system.states.iter().map(|state| state_span(state.symbol)).collect();
+    for ((state, &rate), span) in system.states.iter().zip(&system.rates).zip(spans) {
+        check(&format!("the rate of `{}`", state.name), rate, span);
+    }
+    let measured: Vec<&str> = study.measures.iter().map(|measure| measure.name.as_str()).collect();
+    for (output, (name, _, span)) in system.outputs.iter().zip(study.outputs()) {
+        let what = if measured.contains(&name) { "measure" } else { "criterion" };
+        check(&format!("{what} `{name}`"), output.value, span);
+    }
+    for (equations, (_, _, span)) in system.starts.iter().zip(study.starts()) {
+        for (state, equation) in system.states.iter().zip(equations) {
+            if let StartEquation::Value(node) = equation {
+                check(&format!("the start value of `{}`", state.name), *node, span);
+            }
+        }
+    }
+    if errors.is_empty() { Ok(()) } else { Err(errors) }
+}

@@ -1,0 +1,116 @@
+//! Multipliers of closed loops, on velocity and on position level (Gear-Gupta-Leimkuhler-1985).
+
+use super::articulated::Wrench;
+use super::assembly::assemble_loops;
+use super::kinematics::{self, FrameMotion};
+use super::loops::{self, Direction, Row};
+use super::scale::typical_magnitude;
+use super::system::{Variable, VariableKind};
+use super::topology::Tree;
+use crate::diagnostics::Diagnostic;
+use crate::expression::{Graph, Node, Symbol};
+use crate::quantities::Dimension;
+use crate::study::{ReactionQuantity, Study};
+
+/// Constraints of closed loops with their multipliers.
+pub(super) struct Loops {
+    pub rows: Vec<Row>,
+    /// On velocity and on position level, one per row.
+    pub multipliers: Vec<Symbol>,
+    projections: Vec<Symbol>,
+    positions: Vec<Node>,
+    velocities: Vec<Node>,
+    pub warnings: Vec<Diagnostic>,
+}
+
+impl Loops {
+    pub fn close(
+        graph: &mut Graph,
+        study: &Study,
+        tree: &Tree,
+        frames: &[FrameMotion],
+    ) -> Result<Self, Vec<Diagnostic>> {
+        let rows = loops::rows(graph, study, tree)?;
+        let positions: Vec<Node> = rows.iter().map(|row| row.position(graph, frames)).collect();
+        let velocities: Vec<Node> = rows.iter().map(|row| row.velocity(graph, frames)).collect();
+        let assembly = assemble_loops(graph, study, tree, &rows, (&positions, &velocities))?;
+        let rows: Vec<Row> = assembly.kept.iter().map(|&i| rows[i].clone()).collect();
+        let mut symbols = |word: &str| -> Vec<Symbol> {
+            rows.iter()
+                .map(|row| graph.symbol(&format!("{}.{word}: {}", study.joints[row.joint].name, row.holds)))
+                .collect()
+        };
+        Ok(Self {
+            multipliers: symbols("reaction"),
+            projections: symbols("projection"),
+            positions: assembly.kept.iter().map(|&i| positions[i]).collect(),
+            velocities: assembly.kept.iter().map(|&i| velocities[i]).collect(),
+            rows,
+            warnings: assembly.warnings,
+        })
+    }
+
+    /// Adds what the multipliers do to the links.
+    pub fn load(&self, graph: &mut Graph, frames: &[FrameMotion], multipliers: &[Symbol], wrenches: &mut [Wrench]) {
+        for (row, &multiplier) in self.rows.iter().zip(multipliers) {
+            let multiplier = graph.variable(multiplier);
+            for (link, wrench) in row.wrenches(graph, frames, multiplier) {
+                wrenches[link] = wrenches[link].add(graph, wrench);
+            }
+        }
+    }
+
+    /// G^T mu per link.
+    pub fn projection(&self, graph: &mut Graph, tree: &Tree, frames: &[FrameMotion]) -> Vec<Node> {
+        let zero = graph.constant(0.0);
+        if self.rows.is_empty() {
+            return vec![zero; tree.links.len()];
+        }
+        let mut wrenches: Vec<Wrench> = tree.links.iter().map(|_| Wrench::zero(graph)).collect();
+        self.load(graph, frames, &self.projections, &mut wrenches);
+        let mut result = vec![zero; tree.links.len()];
+        for (i, link) in tree.links.iter().enumerate().rev() {
+            let axis = kinematics::motion_axis(graph, link.axis);
+            result[i] = wrenches[i].on(graph, axis);
+            if let Some(p) = link.predecessor {
+                let carried = wrenches[i].carried_back(graph, &frames[i]);
+                wrenches[p] = wrenches[p].add(graph, carried);
+            }
+        }
+        result
+    }
+}
+
+/// Unknowns without derivative, with one equation each.
+pub(super) fn algebraic_part(
+    graph: &mut Graph,
+    loops: &Loops,
+    reactions: &[(ReactionQuantity, Node)],
+) -> (Vec<Variable>, Vec<Node>) {
+    let variable = |graph: &Graph, symbol: Symbol, dimension: Dimension| Variable {
+        symbol,
+        name: graph.symbol_name(symbol).to_owned(),
+        kind: VariableKind::Algebraic,
+        dimension,
+        scale: typical_magnitude(dimension, VariableKind::Algebraic),
+        reference: 0.0,
+    };
+    let is_turn = |row: &Row| matches!(row.direction, Direction::Turn(_));
+    let mut algebraic = Vec::new();
+    for (row, &symbol) in loops.rows.iter().zip(&loops.multipliers) {
+        algebraic.push(variable(graph, symbol, if is_turn(row) { Dimension::TORQUE } else { Dimension::FORCE }));
+    }
+    for (row, &symbol) in loops.rows.iter().zip(&loops.projections) {
+        let dimension = if is_turn(row) { Dimension::ONE / Dimension::TIME } else { Dimension::VELOCITY };
+        algebraic.push(variable(graph, symbol, dimension));
+    }
+    let mut constraints = [&loops.velocities[..], &loops.positions].concat();
+    for (reaction, value) in reactions {
+        let dimension = if reaction.is_moment { Dimension::TORQUE } else { Dimension::FORCE };
+        algebraic.push(variable(graph, reaction.symbol, dimension));
+        let unknown = graph.variable(reaction.symbol);
+        constraints.push(graph.subtract(unknown, *value));
+    }
+    debug_assert_eq!(algebraic.len(), constraints.len());
+    (algebraic, constraints)
+}
