@@ -9,6 +9,7 @@ mod bdf;
 mod bdf_history;
 mod choice;
 mod consistent;
+mod dormand_prince;
 mod equilibrium;
 mod equilibrium_sparse;
 mod events;

@@ -179,7 +179,7 @@ pub struct Plan {
 pub struct PlannedStep {
     /// Time at the end of the step.
     pub end: f64,
-    /// Order of the BDF; 0 for an explicit step.
+    /// Order of the BDF; 0 for an explicit step of order 5, 8 for one of order 8.
     pub order: u8,
 }
 

@@ -33,6 +33,11 @@ impl<'t> Recorder<'t> {
         }
     }
 
+    /// Whether a requested time up to `reached` has not been taken yet.
+    pub fn wants(&self, reached: f64) -> bool {
+        self.times.get(self.next).is_some_and(|&t| t <= reached)
+    }
+
     /// Takes every requested time up to `reached` from the interpolant.
     pub fn take_until(&mut self, reached: f64, mut interpolate: impl FnMut(f64, &mut [f64])) {
         while let Some(&t) = self.times.get(self.next).filter(|&&t| t <= reached) {

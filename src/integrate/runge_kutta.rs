@@ -1,15 +1,13 @@
-//! Explicit Runge-Kutta method of order 5 with error control, interpolation and exact derivatives of its stages.
+//! Explicit Runge-Kutta methods of order 5 and 8 with error control, interpolation and exact derivatives of their stages.
 
 use super::augmented::Augmented;
 use super::norm::{ErrorNorm, Size};
 use super::problem::{Dynamics, FailureCause, PlannedStep};
 use super::stepper::{Limits, Refusal, first_not_finite};
-use super::tsitouras as method;
+use super::{dormand_prince, tsitouras};
 
 /// Controller of step sizes with memory of the last error (Hairer-Norsett-Wanner-1993, IV.2 of Hairer-Wanner-1996).
 const SAFETY: f64 = 0.9;
-const MEMORY: f64 = 0.04;
-const EXPONENT: f64 = 0.2 - 0.75 * MEMORY;
 const SMALLEST_FACTOR: f64 = 0.2;
 const LARGEST_FACTOR: f64 = 10.0;
 /// A step whose result is not finite is retried at this share.
@@ -18,15 +16,77 @@ const RETREAT: f64 = 0.1;
 /// stability bound (Hairer-Wanner-1996, IV.2).
 const NEAR_STABILITY: f64 = 0.94;
 
+/// Share of the estimate of order 3 in the error of the method of order 8.
+const THIRD_ORDER_SHARE: f64 = 0.1;
+/// Its estimate is that of a method of lower order, which at equal tolerance lets the global error grow larger than the
+/// method of order 5 does; this factor makes up for it.
+const CAUTION: f64 = 10.0;
+
+/// Which pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pair {
+    Five,
+    Eight,
+}
+
+impl Pair {
+    pub fn name(self) -> &'static str {
+        match self {
+            Pair::Five => "Runge-Kutta 5(4)",
+            Pair::Eight => "Runge-Kutta 8(5,3)",
+        }
+    }
+
+    pub fn stability(self) -> f64 {
+        match self {
+            Pair::Five => tsitouras::STABILITY,
+            Pair::Eight => dormand_prince::STABILITY,
+        }
+    }
+
+    /// Mark of its steps in a plan.
+    pub fn order(self) -> u8 {
+        match self {
+            Pair::Five => 0,
+            Pair::Eight => 8,
+        }
+    }
+
+    fn stages(self) -> usize {
+        match self {
+            Pair::Five => tsitouras::STAGES,
+            Pair::Eight => dormand_prince::STAGES,
+        }
+    }
+
+    /// Exponents of the last error and of the one before it in the control of the step.
+    fn exponents(self) -> (f64, f64) {
+        match self {
+            Pair::Five => (0.2 - 0.75 * 0.04, 0.04),
+            Pair::Eight => (0.125, 0.0),
+        }
+    }
+
+    fn first_exponent(self) -> f64 {
+        match self {
+            Pair::Five => 0.2,
+            Pair::Eight => 0.125,
+        }
+    }
+}
+
 /// State of the method between two steps.
 pub(super) struct RungeKutta {
+    pub pair: Pair,
     time: f64,
     /// Length of the last step.
     last_step: f64,
     next_step: f64,
     last_error: f64,
     norm: ErrorNorm,
-    stages: [Vec<f64>; method::STAGES],
+    stages: [Vec<f64>; dormand_prince::ALL_STAGES],
+    /// The stages of the interpolant of order 8 belong to the last step.
+    has_dense_stages: bool,
     /// Solution at the start and at the end of the last step, and at the end of the attempted one.
     before: Vec<f64>,
     current: Vec<f64>,
@@ -42,14 +102,17 @@ pub(super) struct RungeKutta {
 }
 
 impl RungeKutta {
-    pub fn new(length: usize, norm: ErrorNorm) -> Self {
+    pub fn new(pair: Pair, length: usize, norm: ErrorNorm) -> Self {
+        let used = if pair == Pair::Five { tsitouras::STAGES } else { dormand_prince::ALL_STAGES };
         Self {
+            pair,
             time: 0.0,
             last_step: 0.0,
             next_step: 0.0,
             last_error: 1e-4,
             norm,
-            stages: std::array::from_fn(|_| vec![0.0; length]),
+            stages: std::array::from_fn(|stage| vec![0.0; if stage < used { length } else { 0 }]),
+            has_dense_stages: false,
             before: vec![0.0; length],
             current: vec![0.0; length],
             candidate: vec![0.0; length],
@@ -81,8 +144,9 @@ impl RungeKutta {
         self.time = t;
         self.last_error = 1e-4;
         self.current.copy_from_slice(z);
-        system.rates(t, z, &mut self.stages[6]);
-        if let Some(place) = first_not_finite(&self.stages[6]) {
+        let last = self.last();
+        system.rates(t, z, &mut self.stages[last]);
+        if let Some(place) = first_not_finite(&self.stages[last]) {
             return Err(not_finite(t, place, system));
         }
         self.next_step = match limits.initial_step {
@@ -93,20 +157,22 @@ impl RungeKutta {
     }
 
     fn first_step<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, span: f64) -> f64 {
-        let [second, .., first] = &mut self.stages;
+        let last = self.last();
+        let (low, high) = self.stages.split_at_mut(last);
+        let (second, first) = (&mut low[1], &mut high[0]);
         self.norm.guess_column_scale(first, span);
         self.norm.set_weights(&self.current);
         let size = self.norm.of_state(&self.current).norm;
         let slope = self.norm.of(first).norm;
         let guess = if size < 1e-5 || slope < 1e-5 { 1e-6 * span } else { (0.01 * size / slope).min(span) };
-        combine(&mut self.argument, &self.current, guess, [1.0], [first]);
+        combine(&mut self.argument, &self.current, guess, [1.0], [&*first]);
         system.rates(self.time + guess, &self.argument, second);
         for (a, b) in second.iter_mut().zip(first.iter()) {
             *a -= b;
         }
         let curvature = self.norm.of(second).norm / guess;
         let largest = slope.max(curvature);
-        let step = if largest <= 1e-15 { 1e-3 * guess } else { (0.01 / largest).powf(0.2) };
+        let step = if largest <= 1e-15 { 1e-3 * guess } else { (0.01 / largest).powf(self.pair.first_exponent()) };
         if step.is_finite() && step > 0.0 { step.min(100.0 * guess).min(span) } else { guess }
     }
 
@@ -118,7 +184,7 @@ impl RungeKutta {
         end: f64,
     ) -> Result<PlannedStep, Refusal> {
         // The last stage of a step is the first of the next one.
-        self.stages.swap(0, 6);
+        self.begin();
         let mut rejected = false;
         loop {
             let (step, reaches_end) = limits.fit(self.next_step, self.time, end);
@@ -131,7 +197,7 @@ impl RungeKutta {
                 self.next_step = if reaches_end { (step * growth).max(self.next_step) } else { step * growth };
                 system.blame(error.component, self.time);
                 self.accept(system, step, if reaches_end { end } else { self.time + step });
-                return Ok(PlannedStep { end: self.time, order: 0 });
+                return Ok(PlannedStep { end: self.time, order: self.pair.order() });
             }
             rejected = true;
             system.work.rejected_error += 1;
@@ -141,7 +207,7 @@ impl RungeKutta {
 
     /// One step to exactly `end`, without error control.
     pub fn follow<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, end: f64) -> Result<(), Refusal> {
-        self.stages.swap(0, 6);
+        self.begin();
         let step = end - self.time;
         self.attempt(system, step);
         if let Some(place) = self.not_finite_place() {
@@ -151,34 +217,77 @@ impl RungeKutta {
         Ok(())
     }
 
+    /// Index of the stage at the end of the step.
+    fn last(&self) -> usize {
+        self.pair.stages() - 1
+    }
+
+    /// The last stage of a step is the first of the next one.
+    fn begin(&mut self) {
+        let last = self.last();
+        self.stages.swap(0, last);
+        self.has_dense_stages = false;
+    }
+
     /// All stages of a step; the new solution is left in `candidate`.
     fn attempt<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) {
+        match self.pair {
+            Pair::Five => self.attempt_five(system, h),
+            Pair::Eight => self.attempt_eight(system, h),
+        }
+    }
+
+    fn attempt_five<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) {
         let t = self.time;
-        let [k1, k2, k3, k4, k5, k6, k7] = &mut self.stages;
+        let [k1, k2, k3, k4, k5, k6, k7, ..] = &mut self.stages;
         let (base, argument) = (&self.current, &mut self.argument);
-        combine(argument, base, h, method::STAGE_2, [k1]);
-        system.rates(t + method::NODES[1] * h, argument, k2);
-        combine(argument, base, h, method::STAGE_3, [k1, k2]);
-        system.rates(t + method::NODES[2] * h, argument, k3);
-        combine(argument, base, h, method::STAGE_4, [k1, k2, k3]);
-        system.rates(t + method::NODES[3] * h, argument, k4);
-        combine(argument, base, h, method::STAGE_5, [k1, k2, k3, k4]);
-        system.rates(t + method::NODES[4] * h, argument, k5);
-        combine(argument, base, h, method::STAGE_6, [k1, k2, k3, k4, k5]);
+        combine(argument, base, h, tsitouras::STAGE_2, [k1]);
+        system.rates(t + tsitouras::NODES[1] * h, argument, k2);
+        combine(argument, base, h, tsitouras::STAGE_3, [k1, k2]);
+        system.rates(t + tsitouras::NODES[2] * h, argument, k3);
+        combine(argument, base, h, tsitouras::STAGE_4, [k1, k2, k3]);
+        system.rates(t + tsitouras::NODES[3] * h, argument, k4);
+        combine(argument, base, h, tsitouras::STAGE_5, [k1, k2, k3, k4]);
+        system.rates(t + tsitouras::NODES[4] * h, argument, k5);
+        combine(argument, base, h, tsitouras::STAGE_6, [k1, k2, k3, k4, k5]);
         system.rates(t + h, argument, k6);
-        combine(&mut self.candidate, base, h, method::WEIGHTS, [k1, k2, k3, k4, k5, k6]);
+        combine(&mut self.candidate, base, h, tsitouras::WEIGHTS, [k1, k2, k3, k4, k5, k6]);
         system.rates(t + h, &self.candidate, k7);
     }
 
+    fn attempt_eight<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) {
+        let last = self.last();
+        for stage in 1..=last {
+            let (known, new) = self.stages.split_at_mut(stage);
+            let target = if stage == last { &mut self.candidate } else { &mut self.argument };
+            combine_row(target, &self.current, h, dormand_prince::ROWS[stage - 1], known);
+            system.rates(self.time + dormand_prince::NODES[stage] * h, target, &mut new[0]);
+        }
+    }
+
     fn measure(&mut self, h: f64) -> Size {
-        let [k1, k2, k3, k4, k5, k6, k7] = &self.stages;
-        combine(&mut self.error, &self.zero, h, method::ERROR, [k1, k2, k3, k4, k5, k6, k7]);
         self.norm.set_weights_between(&self.current, &self.candidate);
-        self.norm.of(&self.error)
+        match self.pair {
+            Pair::Five => {
+                let [k1, k2, k3, k4, k5, k6, k7, ..] = &self.stages;
+                combine(&mut self.error, &self.zero, h, tsitouras::ERROR, [k1, k2, k3, k4, k5, k6, k7]);
+                self.norm.of(&self.error)
+            }
+            Pair::Eight => {
+                combine_row(&mut self.error, &self.zero, h, dormand_prince::ERROR_3, &self.stages);
+                let third = THIRD_ORDER_SHARE * self.norm.of(&self.error).norm;
+                combine_row(&mut self.error, &self.zero, h, dormand_prince::ERROR_5, &self.stages);
+                let fifth = self.norm.of(&self.error);
+                let both = fifth.norm.hypot(third);
+                let norm = if both > 0.0 && both.is_finite() { CAUTION * fifth.norm * fifth.norm / both } else { both };
+                Size { norm, ..fifth }
+            }
+        }
     }
 
     fn growth(&mut self, error: f64, largest: f64) -> f64 {
-        let factor = SAFETY * error.max(1e-10).powf(-EXPONENT) * self.last_error.powf(MEMORY);
+        let (exponent, memory) = self.pair.exponents();
+        let factor = SAFETY * error.max(1e-10).powf(-exponent) * self.last_error.powf(memory);
         self.last_error = error.max(1e-4);
         factor.clamp(SMALLEST_FACTOR, largest)
     }
@@ -186,7 +295,7 @@ impl RungeKutta {
     fn shrink<D: Dynamics + ?Sized>(&mut self, error: Size, system: &Augmented<D>) -> f64 {
         if error.norm.is_finite() {
             self.trouble = (FailureCause::StepTooSmall, Some(error.component));
-            (SAFETY * error.norm.powf(-EXPONENT)).clamp(SMALLEST_FACTOR, 1.0)
+            (SAFETY * error.norm.powf(-self.pair.exponents().0)).clamp(SMALLEST_FACTOR, 1.0)
         } else {
             let component = self.not_finite_place().map(|place| component_of(place, system));
             self.trouble = (FailureCause::NotFinite, component);
@@ -195,12 +304,12 @@ impl RungeKutta {
     }
 
     fn not_finite_place(&self) -> Option<usize> {
-        first_not_finite(&self.candidate).or(first_not_finite(&self.stages[6]))
+        first_not_finite(&self.candidate).or(first_not_finite(&self.stages[self.last()]))
     }
 
     fn accept<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, step: f64, end: f64) {
         system.work.steps += 1;
-        self.near_stability = self.eigenvalue_times_step(system.n, step) > NEAR_STABILITY * method::STABILITY;
+        self.near_stability = self.eigenvalue_times_step(system.n, step) > NEAR_STABILITY * self.pair.stability();
         std::mem::swap(&mut self.before, &mut self.current);
         std::mem::swap(&mut self.current, &mut self.candidate);
         self.time = end;
@@ -209,7 +318,7 @@ impl RungeKutta {
 
     /// Estimate of h |lambda| for the largest eigenvalue of f_y, from the last two stages, both at the end of the step.
     fn eigenvalue_times_step(&self, n: usize, step: f64) -> f64 {
-        let [.., k6, k7] = &self.stages;
+        let (k6, k7) = (&self.stages[self.last() - 1], &self.stages[self.last()]);
         let weights = self.norm.state_weights();
         let (mut rates, mut states) = (0.0, 0.0);
         for i in 0..n {
@@ -220,11 +329,46 @@ impl RungeKutta {
         if states > 0.0 { step * (rates / states).sqrt() } else { 0.0 }
     }
 
-    /// The solution at a time within the last step.
+    /// Completes what [`RungeKutta::interpolate`] needs for the last step.
+    pub fn prepare_interpolation<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) {
+        if self.pair == Pair::Five || self.has_dense_stages {
+            return;
+        }
+        let h = self.last_step;
+        for stage in dormand_prince::STAGES..dormand_prince::ALL_STAGES {
+            let (known, new) = self.stages.split_at_mut(stage);
+            combine_row(&mut self.argument, &self.before, h, dormand_prince::ROWS[stage - 1], known);
+            system.rates(self.time - (1.0 - dormand_prince::NODES[stage]) * h, &self.argument, &mut new[0]);
+        }
+        self.has_dense_stages = true;
+    }
+
+    /// The solution at a time within the last step, after [`RungeKutta::prepare_interpolation`].
     pub fn interpolate(&self, t: f64, z: &mut [f64]) {
         let share = 1.0 - (self.time - t) / self.last_step;
-        let [k1, k2, k3, k4, k5, k6, k7] = &self.stages;
-        combine(z, &self.before, self.last_step, method::interpolation(share), [k1, k2, k3, k4, k5, k6, k7]);
+        match self.pair {
+            Pair::Five => {
+                let [k1, k2, k3, k4, k5, k6, k7, ..] = &self.stages;
+                let weights = tsitouras::interpolation(share);
+                combine(z, &self.before, self.last_step, weights, [k1, k2, k3, k4, k5, k6, k7]);
+            }
+            Pair::Eight => self.interpolate_eight(share, z),
+        }
+    }
+
+    fn interpolate_eight(&self, share: f64, z: &mut [f64]) {
+        let (h, rest) = (self.last_step, 1.0 - share);
+        let (first, last) = (&self.stages[0], &self.stages[self.last()]);
+        for (i, value) in z.iter_mut().enumerate() {
+            let change = self.current[i] - self.before[i];
+            let bend = h * first[i] - change;
+            let twist = change - h * last[i] - bend;
+            let [a, b, c, d] = dormand_prince::DENSE.map(|row| {
+                h * row.iter().map(|&(stage, coefficient)| coefficient * self.stages[stage][i]).sum::<f64>()
+            });
+            let high = a + share * (b + rest * (c + share * d));
+            *value = self.before[i] + share * (change + rest * (bend + share * (twist + rest * high)));
+        }
     }
 }
 
@@ -248,5 +392,14 @@ fn combine<const S: usize>(out: &mut [f64], base: &[f64], h: f64, coefficients: 
             sum += coefficients[s] * stages[s][i];
         }
         out[i] = base[i] + h * sum;
+    }
+}
+
+/// As [`combine`], with coefficients and stages from a table.
+fn combine_row(out: &mut [f64], base: &[f64], h: f64, row: dormand_prince::Row, stages: &[Vec<f64>]) {
+    out.copy_from_slice(base);
+    for &(stage, coefficient) in row {
+        let factor = h * coefficient;
+        out.iter_mut().zip(&stages[stage]).for_each(|(o, k)| *o += factor * k);
     }
 }
