@@ -1,8 +1,9 @@
 //! `ident compare STUDY`
 
-use super::fit::identify;
+use super::fit::{SearchArguments, fit_variant};
 use super::session::Session;
 use super::{Failed, Format, StudyArguments};
+use crate::identify::{Candidate, Identification, identification, structures};
 use crate::report;
 
 #[derive(clap::Args, Debug)]
@@ -17,7 +18,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     let session = Session::open(&study.study, study.format)?;
     let mut names = vec!["base".to_owned()];
     names.extend(session.check("base")?.variants);
-    let results = names.iter().map(|name| identify(&session, study, name)).collect::<Result<Vec<_>, _>>()?;
+    let fits = names
+        .iter()
+        .map(|name| fit_variant(&session, study, name, &SearchArguments::one()))
+        .collect::<Result<Vec<_>, _>>()?;
+    let candidates: Vec<Candidate> = fits
+        .iter()
+        .map(|fit| Candidate { compiled: &fit.compiled, fitted: &fit.fitted, records: &fit.records })
+        .collect();
+    let mut results: Vec<Identification> = fits
+        .iter()
+        .map(|fit| identification(&fit.compiled, &fit.fitted, &fit.records.iter().collect::<Vec<_>>()))
+        .collect();
+    for (result, structure) in results.iter_mut().zip(structures(&candidates)) {
+        result.structure = Some(structure);
+    }
     match study.format {
         Format::Text => print!("{}", report::terminal::comparison(&results)),
         Format::Json => println!("{}", super::output::json(report::json::comparison(&results))?),

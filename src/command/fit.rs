@@ -4,7 +4,7 @@ use super::output::write_whole;
 use super::session::Session;
 use super::{Failed, Format, StudyArguments};
 use crate::fit::Control;
-use crate::identify::{Fitted, Identification, Settings, fit, identification};
+use crate::identify::{Fitted, Settings, fit, identification};
 use crate::report;
 use crate::simulation::{Compiled, Record};
 use crate::study::Role;
@@ -59,12 +59,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
         Format::Json => println!("{}", super::output::json(report::json::identification(&result))?),
     }
     Ok(())
-}
-
-/// Fits one variant to its estimation records and reports it on all records.
-pub(super) fn identify(session: &Session, study: &StudyArguments, variant: &str) -> Result<Identification, Failed> {
-    let fit = fit_variant(session, study, variant, &SearchArguments::one())?;
-    Ok(identification(&fit.compiled, &fit.fitted, &fit.records.iter().collect::<Vec<_>>()))
 }
 
 /// A variant fitted to its estimation records.

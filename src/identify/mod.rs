@@ -12,6 +12,7 @@ mod problem;
 mod report;
 mod result;
 mod saved;
+mod structures;
 mod weights;
 
 pub use confidence::{Confidence, confidence};
@@ -20,4 +21,5 @@ pub use problem::{Block, Problem};
 pub use report::identification;
 pub use result::*;
 pub use saved::{RESULT, SavedParameter, SavedResult};
+pub use structures::{Candidate, structures};
 pub use weights::Weighting;

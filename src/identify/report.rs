@@ -44,6 +44,7 @@ pub fn identification(compiled: &Compiled, fitted: &Fitted, records: &[&Record])
         failed_simulations: fitted.failed_simulations,
         stop_reason: fitted.stop_reason.to_string(),
         gradient_digits,
+        structure: None,
         remarks,
     }
 }

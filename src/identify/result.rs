@@ -34,8 +34,29 @@ pub struct Identification {
     pub stop_reason: String,
     /// Digits to which the gradient agrees with an independent one in random directions; absent when not asked for.
     pub gradient_digits: Option<f64>,
+    /// How the structure stands against the first one; only where several are compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub structure: Option<Structure>,
     /// Anything a reader must know: parameters at bounds, missing influence, fallbacks.
     pub remarks: Vec<String>,
+}
+
+/// A structure against the first one. Both count their residuals alike, so that criteria can be subtracted.
+#[derive(Clone, Debug, JsonSchema, PartialEq, Serialize)]
+pub struct Structure {
+    /// Corrected Akaike criterion with unknown variance per channel; only differences mean something.
+    pub aicc: f64,
+    /// Bayesian criterion with unknown variance per channel; only differences mean something.
+    pub bic: f64,
+    /// Twice the logarithm of the likelihood ratio to the first structure.
+    pub likelihood_ratio: Option<f64>,
+    /// Its p-value; only for a structure that contains the first one.
+    pub likelihood_ratio_p: Option<f64>,
+    /// Vuong's test statistic, positive where this structure is better; only where neither contains the other.
+    pub vuong_z: Option<f64>,
+    pub vuong_p: Option<f64>,
+    /// Relative change of the held-out error (root mean square) with its 95 % interval: [change, low, high].
+    pub held_out_change: Option<(f64, f64, f64)>,
 }
 
 #[derive(Clone, Debug, JsonSchema, Serialize)]

@@ -23,4 +23,6 @@ pub use covariance::{Covariance, confidence_interval, filtered_noise_gamma, stat
 pub use identifiability::{Identifiability, Undetermined, identifiability};
 pub use noise::{NoiseChannel, noise_variance, noise_variances};
 pub use random::{NormalStream, covariance_root};
-pub use significance::{chi_square_p, f_test_p, likelihood_ratio_p, mixture_p, normal_quantile, student_quantile};
+pub use significance::{
+    chi_square_p, f_test_p, likelihood_ratio_p, mixture_p, normal_probability, normal_quantile, student_quantile,
+};

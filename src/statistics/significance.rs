@@ -53,6 +53,11 @@ pub fn student_quantile(probability: f64, degrees_of_freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(f64::NAN, |distribution| distribution.inverse_cdf(probability))
 }
 
+/// Probability that a standard normal variable is below `value`.
+pub fn normal_probability(value: f64) -> f64 {
+    Normal::new(0.0, 1.0).map_or(f64::NAN, |distribution| distribution.cdf(value))
+}
+
 pub fn normal_quantile(probability: f64) -> f64 {
     Normal::new(0.0, 1.0).map_or(f64::NAN, |distribution| distribution.inverse_cdf(probability))
 }

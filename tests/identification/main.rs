@@ -5,5 +5,6 @@ mod coverage;
 mod nuisance;
 mod plan;
 mod shipped;
+mod structures;
 mod surface;
 mod validity;

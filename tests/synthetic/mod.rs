@@ -139,6 +139,7 @@ pub fn identification(variant: &str, parameters: Vec<ParameterEstimate>, records
         failed_simulations: 0,
         stop_reason: "relative change of the cost below 1e-8".into(),
         gradient_digits: Some(7.4),
+        structure: None,
         remarks: vec![],
         parameters,
         records,

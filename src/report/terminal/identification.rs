@@ -194,11 +194,12 @@ pub fn comparison(variants: &[Identification], colour: Colour) -> String {
             fit.parameters.len().to_string(),
             number::percent(fit.estimation_discrepancy),
             fit.validation_discrepancy.map_or("-".into(), number::percent),
-            number::fixed(fit.bic - base.bic, 1),
+            bic_difference(fit, base),
             if at_bound > 0 { format!("{at_bound} at bound") } else { String::new() },
         ]);
     }
     sheet.table(&table, 2);
+    structure_section(&mut sheet, variants);
     record_section(&mut sheet, variants);
     estimate_section(&mut sheet, variants);
     for fit in variants.iter().filter(|fit| !fit.remarks.is_empty()) {
@@ -206,6 +207,50 @@ pub fn comparison(variants: &[Identification], colour: Colour) -> String {
         fit.remarks.iter().for_each(|remark| sheet.item(remark));
     }
     sheet.finish()
+}
+
+/// With common counts where the structures were compared.
+fn bic_difference(fit: &Identification, base: &Identification) -> String {
+    match (&fit.structure, &base.structure) {
+        (Some(own), Some(first)) => number::fixed(own.bic - first.bic, 1),
+        _ => number::fixed(fit.bic - base.bic, 1),
+    }
+}
+
+fn structure_section(sheet: &mut Sheet, variants: &[Identification]) {
+    let Some(first) = variants.first().and_then(|base| base.structure.as_ref()) else { return };
+    if variants.len() < 2 {
+        return;
+    }
+    sheet.heading(&format!("Against {}", variants[0].variant));
+    let mut table = Table::new(&[
+        ("variant", Lean::Left),
+        ("AICc", Lean::Right),
+        ("BIC", Lean::Right),
+        ("likelihood ratio", Lean::Right),
+        ("p", Lean::Right),
+        ("Vuong z", Lean::Right),
+        ("p ", Lean::Right),
+        ("held-out error, 95 % interval", Lean::Left),
+    ]);
+    for fit in &variants[1..] {
+        let Some(structure) = &fit.structure else { continue };
+        let text = |value: Option<f64>, show: &dyn Fn(f64) -> String| value.map_or_else(String::new, show);
+        let percent = |value: f64| number::signed(value, number::fixed(100.0 * value, 1));
+        table.row(vec![
+            fit.variant.clone(),
+            number::fixed(structure.aicc - first.aicc, 1),
+            number::fixed(structure.bic - first.bic, 1),
+            text(structure.likelihood_ratio, &|value| number::fixed(value, 1)),
+            text(structure.likelihood_ratio_p, &number::probability),
+            text(structure.vuong_z, &|value| number::fixed(value, 2)),
+            text(structure.vuong_p, &number::probability),
+            structure.held_out_change.map_or_else(String::new, |(change, low, high)| {
+                format!("{} % ({} .. {})", percent(change), percent(low), percent(high))
+            }),
+        ]);
+    }
+    sheet.table(&table, 2);
 }
 
 fn columns<'a>(first: &'a str, variants: &'a [Identification]) -> Vec<(&'a str, Lean)> {
