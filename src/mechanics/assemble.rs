@@ -43,7 +43,7 @@ pub(super) fn assemble(
     let outputs: Vec<Output> = study.outputs().zip(values).map(name_and_value).collect();
     let probes = probes(&mut graph, study, meaning);
     let starts = all_starts(&mut graph, study, &states, meaning)?;
-    let (algebraic, constraints) = algebraic_part(&mut graph, &loops, &reactions);
+    let (algebraic, constraints, constraint_names) = algebraic_part(&mut graph, study, &loops, &reactions);
     let index_two = (0..algebraic.len()).map(|i| i < 2 * loops.rows.len()).collect();
 
     let system = System {
@@ -53,6 +53,7 @@ pub(super) fn assemble(
         rates,
         algebraic,
         constraints,
+        constraint_names,
         hidden,
         index_two,
         warnings: loops.warnings,

@@ -81,12 +81,13 @@ impl Loops {
     }
 }
 
-/// Unknowns without derivative, with one equation each.
+/// Unknowns without derivative, with one equation each and its name.
 pub(super) fn algebraic_part(
     graph: &mut Graph,
+    study: &Study,
     loops: &Loops,
     reactions: &[(ReactionQuantity, Node)],
-) -> (Vec<Variable>, Vec<Node>) {
+) -> (Vec<Variable>, Vec<Node>, Vec<String>) {
     let variable = |graph: &Graph, symbol: Symbol, dimension: Dimension| Variable {
         symbol,
         name: graph.symbol_name(symbol).to_owned(),
@@ -104,13 +105,19 @@ pub(super) fn algebraic_part(
         let dimension = if is_turn(row) { Dimension::ONE / Dimension::TIME } else { Dimension::VELOCITY };
         algebraic.push(variable(graph, symbol, dimension));
     }
+    let level = |word: &str| -> Vec<String> {
+        let joints = loops.rows.iter().map(|row| (&study.joints[row.joint].name, &row.holds));
+        joints.map(|(joint, holds)| format!("{word} of `{joint}` ({holds})")).collect()
+    };
+    let mut names = [level("velocity constraint"), level("position constraint")].concat();
     let mut constraints = [&loops.velocities[..], &loops.positions].concat();
     for (reaction, value) in reactions {
         let dimension = if reaction.is_moment { Dimension::TORQUE } else { Dimension::FORCE };
         algebraic.push(variable(graph, reaction.symbol, dimension));
+        names.push(format!("definition of `{}`", graph.symbol_name(reaction.symbol)));
         let unknown = graph.variable(reaction.symbol);
         constraints.push(graph.subtract(unknown, *value));
     }
     debug_assert_eq!(algebraic.len(), constraints.len());
-    (algebraic, constraints)
+    (algebraic, constraints, names)
 }

@@ -22,6 +22,8 @@ pub struct System {
     pub algebraic: Vec<Variable>,
     /// One per algebraic variable: velocity constraints, position constraints, definitions of the reactions.
     pub constraints: Vec<Node>,
+    /// In the study's words, one per constraint.
+    pub constraint_names: Vec<String>,
     /// Time derivatives of the velocity constraints: they determine the first algebraic variables, one each.
     pub hidden: Vec<Node>,
     /// True per algebraic variable that is a multiplier: its constraint does not contain it.

@@ -244,10 +244,9 @@ impl<'a> Checker<'a> {
         for body in 0..self.bodies.len() {
             self.topology.chain(Some(body)).into_iter().for_each(|joint| moved_by[joint].push(body));
         }
-        for joint in 0..self.topology.joints.len() {
+        for (joint, moved) in moved_by.iter().enumerate() {
             let Some(read) = self.topology.joint(joint).filter(|_| !self.topology.closes_loop[joint]) else { continue };
             let (child, freedom) = (read.child, &read.freedom);
-            let moved = &moved_by[joint];
             let is_weightless = |body: &usize| self.graph.is_zero(self.bodies[*body].mass);
             let has_no_inertia = |body: &usize| self.bodies[*body].inertia.iter().all(|part| self.graph.is_zero(*part));
             let moves_freely = |at: usize| !self.topology.closes_loop[joint] && !self.is_prescribed(joint, at);

@@ -241,6 +241,13 @@ impl Dynamics for Bound<'_> {
         true
     }
 
+    fn equation_name(&self, i: usize) -> String {
+        match i.checked_sub(self.model.state_count).and_then(|at| self.model.constraint_names.get(at)) {
+            Some(name) => name.clone(),
+            None => format!("rate of `{}`", self.component_name(i)),
+        }
+    }
+
     fn component_name(&self, i: usize) -> String {
         self.model.variables.get(i).map_or_else(|| format!("y[{i}]"), |variable| variable.name.clone())
     }

@@ -108,6 +108,7 @@ impl Model {
         debug_assert_eq!(p, system.parameter_names.len());
         Model {
             state_count,
+            constraint_names: system.constraint_names.clone(),
             parameter_names: system.parameter_names.clone(),
             output_names: system.outputs.iter().map(|output| output.name.clone()).collect(),
             probe_names: system.probes.iter().map(|probe| probe.name.clone()).collect(),

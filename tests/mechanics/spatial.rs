@@ -47,8 +47,8 @@ fn random_tree(random: &mut Random, kinds: &[usize], damping: f64) -> Builder {
         let far = b.attach(Some(body), random.vector());
         let (parent, child) = if random.next() < 0.0 { (near, far) } else { (far, near) };
         let joint = b.joint(&format!("joint{i}"), kind, parent, child);
-        if !matches!(kind, None) && random.next() > 0.0 {
-            spring(&mut b, &format!("in_joint{i}"), ForcePlace::Joint { joint: joint, axis: 0 }, damping);
+        if kind.is_some() && random.next() > 0.0 {
+            spring(&mut b, &format!("in_joint{i}"), ForcePlace::Joint { joint, axis: 0 }, damping);
         }
         let point = b.attach(Some(body), random.vector());
         for motion in [PointMotion::Position, PointMotion::Velocity, PointMotion::Acceleration] {
