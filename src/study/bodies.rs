@@ -247,6 +247,10 @@ impl<'a> Checker<'a> {
         for (joint, moved) in moved_by.iter().enumerate() {
             let Some(read) = self.topology.joint(joint).filter(|_| !self.topology.closes_loop[joint]) else { continue };
             let (child, freedom) = (read.child, &read.freedom);
+            // A part without connection to ground is reported elsewhere.
+            if moved.is_empty() {
+                continue;
+            }
             let is_weightless = |body: &usize| self.graph.is_zero(self.bodies[*body].mass);
             let has_no_inertia = |body: &usize| self.bodies[*body].inertia.iter().all(|part| self.graph.is_zero(*part));
             let moves_freely = |at: usize| !self.topology.closes_loop[joint] && !self.is_prescribed(joint, at);
