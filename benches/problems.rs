@@ -31,9 +31,10 @@ fn error_of_sensitivities(own: &Trajectory, reference: &Trajectory, theta: &[f64
             reference[j * samples..(j + 1) * samples].iter().fold(0.0_f64, |m, v| m.max((v * theta[j]).abs()))
         };
         let largest = (0..theta.len()).map(size).fold(0.0, f64::max);
-        for j in 0..theta.len() {
+        for (j, parameter) in theta.iter().enumerate() {
             let range = j * samples..(j + 1) * samples;
-            let differences = own[range.clone()].iter().zip(&reference[range]).map(|(a, b)| ((a - b) * theta[j]).abs());
+            let differences =
+                own[range.clone()].iter().zip(&reference[range]).map(|(a, b)| ((a - b) * parameter).abs());
             worst = worst.max(differences.fold(0.0, f64::max) / size(j).max(1e-3 * largest));
         }
     }

@@ -1,5 +1,7 @@
 //! Mechanisms declared as bodies and joints, against published solutions and closed forms.
 
+#![allow(clippy::needless_range_loop, reason = "several channels are read side by side")]
+
 use ident::diagnostics::render;
 use ident::simulation::{Compiled, Gradient, prepare, simulate};
 use ident::study::{check, load_text};
@@ -369,7 +371,7 @@ gravity = 9.81 m/s^2 along -z
 body ball {{ mass = 0.8 kg, inertia = 0 kg*m^2 }}
 joint angles: axes(turn z, turn y) ground -> arm
 joint grip: fixed arm.end -> ball
-body arm {{ mass = 0 kg, inertia = 0 kg*m^2, point end = (0 m, 0 m, {}m) }}
+body arm {{ mass = 0 kg, inertia = 0 kg*m^2, point end = (0 m, 0 m, {} m) }}
 measure x [m] = ball.position.x
 measure y [m] = ball.position.y
 measure Fz [N] = angles.reaction.force.z
@@ -379,7 +381,7 @@ experiment run {{
 }}
 solver {{ tolerance = 1e-11 }}
 "#,
-        format!("{} ", -length)
+        -length
     );
     let own = simulated("conical", &text, &times_only(&["x [m]", "y [m]", "Fz [N]", "Fx [N]"], 4.0));
     let radius = length * tilt.sin();

@@ -6,7 +6,7 @@ pub(super) enum Shape {
     Linear,
     /// Cubic pieces with slopes that keep the data's monotony (Fritsch-Carlson-1980).
     Monotone,
-    /// Cubic spline with continuous second derivative, zero at the ends (deBoor-2001).
+    /// Cubic spline with continuous second derivative, zero at the ends (Boor-2001).
     Cubic,
 }
 
