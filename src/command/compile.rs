@@ -1,9 +1,9 @@
-//! `ident compile STUDY --emit flat|tree|model|equations|tape`
+//! `ident compile STUDY --emit flat|tree|model|equations|latex|tape`
 
 use super::output::show;
 use super::session::Session;
 use super::{Failed, Format};
-use crate::mechanics::{emit_equations, emit_model, emit_tree};
+use crate::mechanics::{emit_equations, emit_latex, emit_model, emit_tree};
 use crate::study::flat_text;
 use crate::tape::emit_tape;
 use clap::ValueEnum;
@@ -31,6 +31,8 @@ enum Emit {
     Model,
     /// Equations of motion and measurements
     Equations,
+    /// The same as LaTeX, for small models
+    Latex,
     /// Instructions of the compiled closures
     Tape,
 }
@@ -48,6 +50,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
         Emit::Tree => emit_tree(&compiled.study).map_err(|diagnostics| session.fail(&diagnostics))?,
         Emit::Model => emit_model(&compiled.study, &compiled.system),
         Emit::Equations => emit_equations(&compiled.study, &compiled.system),
+        Emit::Latex => emit_latex(&compiled.study, &compiled.system),
         Emit::Tape => emit_tape(&compiled.model),
     };
     show(&text);

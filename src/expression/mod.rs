@@ -10,6 +10,7 @@
 
 mod differentiate;
 mod graph;
+mod latex;
 mod print;
 #[cfg(test)]
 mod properties;
@@ -18,4 +19,5 @@ pub(crate) mod vector;
 
 pub use differentiate::Entry;
 pub use graph::{Binary, Graph, Node, Operation, Symbol, Unary};
+pub use latex::{LatexPrinter, latex_name};
 pub use print::Printer;

@@ -70,6 +70,15 @@ impl<'a> Printer<'a> {
         self.definitions.iter().map(|&node| (self.names[&node].clone(), self.operation(node).0)).collect()
     }
 
+    /// The named subexpressions, each before its first use.
+    pub(super) fn named(&self) -> impl Iterator<Item = (Node, &str)> {
+        self.definitions.iter().map(|node| (*node, self.names[node].as_str()))
+    }
+
+    pub(super) fn name_of(&self, node: Node) -> Option<&str> {
+        self.names.get(&node).map(String::as_str)
+    }
+
     pub fn text(&self, node: Node) -> String {
         self.bound(node).0
     }

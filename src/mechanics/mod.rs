@@ -14,6 +14,7 @@ mod assemble;
 mod assembly;
 mod derive;
 mod emit;
+mod emit_latex;
 mod forces;
 mod inertia;
 mod kinematics;
@@ -27,4 +28,5 @@ mod topology;
 
 pub use derive::derive;
 pub use emit::{emit_equations, emit_model, emit_tree};
+pub use emit_latex::emit_latex;
 pub use system::*;

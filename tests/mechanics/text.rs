@@ -2,7 +2,7 @@
 
 use crate::build::{Builder, GROUND, along};
 use ident::expression::Unary;
-use ident::mechanics::{derive, emit_equations, emit_model, emit_tree};
+use ident::mechanics::{derive, emit_equations, emit_latex, emit_model, emit_tree};
 use ident::study::*;
 use ident::tape::{Model, emit_tape};
 
@@ -86,4 +86,5 @@ fn crane_text() {
     let system = derive(&study).expect("derivable");
     insta::assert_snapshot!("crane_tree", emit_tree(&study).expect("connected"));
     insta::assert_snapshot!("crane_equations", emit_equations(&study, &system));
+    insta::assert_snapshot!("crane_latex", emit_latex(&study, &system));
 }
