@@ -18,6 +18,28 @@ pub(super) struct DenseLu {
     exchanges: Vec<usize>,
 }
 
+/// Products are added up in this many separate sums where rows are long: one sum would wait for every addition.
+const LANES: usize = 8;
+/// Rows from this length on count as long.
+const LONG_ROW: usize = 64;
+
+/// Scalar product of slices of equal length; the order of additions depends on the length only.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() < LONG_ROW {
+        return a.iter().zip(b).map(|(a, b)| a * b).sum();
+    }
+    let (a_lanes, a_rest) = a.as_chunks::<LANES>();
+    let (b_lanes, b_rest) = b.as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for (a, b) in a_lanes.iter().zip(b_lanes) {
+        for lane in 0..LANES {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
 impl DenseLu {
     pub fn new(pattern: &SparsityPattern) -> Self {
         let n = pattern.column_count;
@@ -111,12 +133,12 @@ impl DenseLu {
         let n = self.n;
         for i in 1..n {
             let row = &self.lu[i * n..i * n + i];
-            let sum: f64 = row.iter().zip(&x[..i]).map(|(a, b)| a * b).sum();
+            let sum = dot(row, &x[..i]);
             x[i] -= sum;
         }
         for i in (0..n).rev() {
             let row = &self.lu[i * n + i + 1..(i + 1) * n];
-            let sum: f64 = row.iter().zip(&x[i + 1..n]).map(|(a, b)| a * b).sum();
+            let sum = dot(row, &x[i + 1..n]);
             x[i] = (x[i] - sum) * self.inverse_pivot[i];
         }
     }

@@ -168,4 +168,13 @@ mod tests {
             assert!(Factorisation::new(&pattern).factor(&values).is_err());
         }
     }
+
+    #[test]
+    fn long_rows_are_solved() {
+        let offsets: Vec<i64> = (-149..150).collect();
+        let pattern = band(150, &offsets);
+        let values: Vec<f64> = (0..pattern.len()).map(|k| ((k * k * 31 % 1009) as f64 - 500.0) / 500.0).collect();
+        check(&pattern, &values, 1, 1e-9);
+        check(&pattern, &values, 3, 1e-9);
+    }
 }
