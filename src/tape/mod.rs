@@ -12,6 +12,7 @@ mod compile;
 mod emit;
 mod model;
 mod program;
+mod slopes;
 mod sweep;
 mod tangent;
 

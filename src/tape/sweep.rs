@@ -7,6 +7,7 @@
 use super::InputSource;
 use super::model::Element;
 use super::program::{Instruction, Program};
+use super::slopes::{slope, slopes};
 use crate::expression::{Binary, Unary};
 
 /// Columns pushed forward together.
@@ -222,49 +223,5 @@ fn partials(linear: &Linear, registers: &[f64], inputs: &dyn InputSource) -> [f6
         Instruction::Select if value(0) != 0.0 => [1.0, 0.0],
         Instruction::Select => [0.0, 1.0],
         Instruction::Sample { input, order } => [inputs.sample(input, order + 1, value(0)), 0.0],
-    }
-}
-
-fn slope(function: Unary, a: f64, result: f64) -> f64 {
-    match function {
-        Unary::Negate => -1.0,
-        Unary::Sin => a.cos(),
-        Unary::Cos => -a.sin(),
-        Unary::Tan => 1.0 + result * result,
-        Unary::Asin => 1.0 / (1.0 - a * a).sqrt(),
-        Unary::Acos => -1.0 / (1.0 - a * a).sqrt(),
-        Unary::Atan => 1.0 / (1.0 + a * a),
-        Unary::Sinh => a.cosh(),
-        Unary::Cosh => a.sinh(),
-        Unary::Tanh => 1.0 - result * result,
-        Unary::Exp => result,
-        Unary::Log => 1.0 / a,
-        Unary::Sqrt => 1.0 / (2.0 * result),
-        Unary::Abs => Unary::Sign.evaluate(a),
-        Unary::Sign | Unary::Floor => 0.0,
-    }
-}
-
-fn slopes(function: Binary, [a, b]: [f64; 2], result: f64) -> [f64; 2] {
-    match function {
-        Binary::Add => [1.0, 1.0],
-        Binary::Subtract => [1.0, -1.0],
-        Binary::Multiply => [b, a],
-        Binary::Divide => [1.0 / b, -result / b],
-        Binary::Power => {
-            let by_base = if b == 0.0 { 0.0 } else { b * a.powf(b - 1.0) };
-            // A base of zero does not move with a positive exponent.
-            let by_exponent = if a > 0.0 { result * a.ln() } else { 0.0 };
-            [by_base, by_exponent]
-        }
-        Binary::Minimum if a < b => [1.0, 0.0],
-        Binary::Minimum => [0.0, 1.0],
-        Binary::Maximum if b < a => [1.0, 0.0],
-        Binary::Maximum => [0.0, 1.0],
-        Binary::Atan2 => {
-            let square = a * a + b * b;
-            [b / square, -a / square]
-        }
-        Binary::Less => [0.0, 0.0],
     }
 }

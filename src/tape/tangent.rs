@@ -3,8 +3,8 @@
 //! An independent check of the symbolic derivatives; slower than them and not used to compute answers.
 
 use super::program::{Instruction, Program};
+use super::slopes::{slope as slope_of, slopes as slopes_of};
 use super::{Bound, InputSource};
-use crate::expression::{Binary, Unary};
 
 impl Program {
     /// Slopes of all results from the slopes of what they read; `values` hold the program's results already.
@@ -16,9 +16,9 @@ impl Program {
                 let slope = |i: usize| slopes[operands[i] as usize];
                 let target = run.first_target + k;
                 slopes[target] = match run.instruction {
-                    Instruction::Unary(function) => unary(function, value(0), values[target]) * slope(0),
+                    Instruction::Unary(function) => slope_of(function, value(0), values[target]) * slope(0),
                     Instruction::Binary(function) => {
-                        binary(function, [value(0), value(1)], [slope(0), slope(1)], values[target])
+                        carried(slopes_of(function, [value(0), value(1)], values[target]), [slope(0), slope(1)])
                     }
                     Instruction::Select => slope(if value(0) != 0.0 { 1 } else { 2 }),
                     Instruction::Sample { input, order } if slope(0) != 0.0 => {
@@ -31,55 +31,9 @@ impl Program {
     }
 }
 
-/// Derivative of a function at `a`, where it has the value `result`.
-fn unary(function: Unary, a: f64, result: f64) -> f64 {
-    match function {
-        Unary::Negate => -1.0,
-        Unary::Sin => a.cos(),
-        Unary::Cos => -a.sin(),
-        Unary::Tan => 1.0 + result * result,
-        Unary::Asin => 1.0 / (1.0 - a * a).sqrt(),
-        Unary::Acos => -1.0 / (1.0 - a * a).sqrt(),
-        Unary::Atan => 1.0 / (1.0 + a * a),
-        Unary::Sinh => a.cosh(),
-        Unary::Cosh => a.sinh(),
-        Unary::Tanh => 1.0 - result * result,
-        Unary::Exp => result,
-        Unary::Log => 1.0 / a,
-        Unary::Sqrt => 0.5 / result,
-        Unary::Abs => a.signum() * f64::from(a != 0.0),
-        Unary::Sign | Unary::Floor => 0.0,
-    }
-}
-
-fn binary(function: Binary, [a, b]: [f64; 2], [da, db]: [f64; 2], result: f64) -> f64 {
-    match function {
-        Binary::Add => da + db,
-        Binary::Subtract => da - db,
-        Binary::Multiply => da * b + a * db,
-        Binary::Divide => (da - result * db) / b,
-        Binary::Power => {
-            let by_base = if da == 0.0 { 0.0 } else { b * a.powf(b - 1.0) * da };
-            let by_exponent = if db == 0.0 { 0.0 } else { result * a.ln() * db };
-            by_base + by_exponent
-        }
-        Binary::Minimum => {
-            if a < b {
-                da
-            } else {
-                db
-            }
-        }
-        Binary::Maximum => {
-            if a > b {
-                da
-            } else {
-                db
-            }
-        }
-        Binary::Atan2 => (da * b - a * db) / (a * a + b * b),
-        Binary::Less => 0.0,
-    }
+/// What the operands' slopes `da`, `db` give; an operand that does not move adds nothing, even where its factor is infinite.
+fn carried(factors: [f64; 2], slopes: [f64; 2]) -> f64 {
+    factors.into_iter().zip(slopes).filter(|(_, slope)| *slope != 0.0).map(|(factor, slope)| factor * slope).sum()
 }
 
 /// Slopes of all registers for one direction of the parameters.
