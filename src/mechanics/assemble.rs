@@ -25,7 +25,7 @@ pub(super) fn assemble(
     frames: &[FrameMotion],
     accelerated: &[Accelerated],
     meaning: &HashMap<Symbol, Node>,
-    (loops, hidden, reactions): (Loops, Vec<Node>, Vec<(ReactionQuantity, Node)>),
+    (loops, reactions): (Loops, Vec<(ReactionQuantity, Node)>),
 ) -> Result<System, Vec<Diagnostic>> {
     let moving: Vec<usize> = tree.links_of_joint.iter().flatten().copied().collect();
     let projection = loops.projection(&mut graph, tree, frames);
@@ -44,7 +44,6 @@ pub(super) fn assemble(
     let probes = probes(&mut graph, study, meaning);
     let starts = all_starts(&mut graph, study, &states, meaning)?;
     let (algebraic, constraints, constraint_names) = algebraic_part(&mut graph, study, &loops, &reactions);
-    let index_two = (0..algebraic.len()).map(|i| i < 2 * loops.rows.len()).collect();
 
     let system = System {
         graph,
@@ -54,8 +53,7 @@ pub(super) fn assemble(
         algebraic,
         constraints,
         constraint_names,
-        hidden,
-        index_two,
+        loop_constraints: loops.rows.len(),
         warnings: loops.warnings,
         parameters: study.parameters.iter().map(|p| p.symbol).collect(),
         parameter_names: study.parameters.iter().map(|p| p.name.clone()).collect(),

@@ -42,10 +42,10 @@ pub fn derive(study: &Study) -> Result<System, Vec<Diagnostic>> {
 
     let accelerated = accelerate(&mut graph, study, &tree, &frames, &inertias, (&geometries, &loads), &loops);
     refuse_missing_inertia(&graph, study, &tree, &accelerated)?;
-    let hidden = add_accelerations(&mut graph, study, &tree, &frames, &accelerated, &loops, &mut meaning);
+    add_accelerations(&mut graph, study, &tree, &frames, &accelerated, &mut meaning);
     let reactions =
         add_reactions(&mut graph, study, (&tree, &frames), &accelerated, (&geometries, &loads), &loops, &mut meaning);
-    assemble(graph, study, &tree, &frames, &accelerated, &meaning, (loops, hidden, reactions))
+    assemble(graph, study, &tree, &frames, &accelerated, &meaning, (loops, reactions))
 }
 
 fn force_geometries(
@@ -199,16 +199,15 @@ fn accelerate(
     articulated::articulated_bodies(graph, tree, frames, inertias, &coordinate_loads, &wrenches, study.gravity)
 }
 
-/// Meaning of all accelerations; returns the time derivatives of the velocity constraints.
+/// Meaning of all accelerations.
 fn add_accelerations(
     graph: &mut Graph,
     study: &Study,
     tree: &Tree,
     frames: &[FrameMotion],
     accelerated: &[Accelerated],
-    loops: &Loops,
     meaning: &mut HashMap<Symbol, Node>,
-) -> Vec<Node> {
+) {
     let joint_accelerations: Vec<Node> = accelerated.iter().map(|a| a.acceleration).collect();
     for (link, &acceleration) in tree.links.iter().zip(&joint_accelerations) {
         match link.coordinate {
@@ -222,8 +221,8 @@ fn add_accelerations(
         }
     }
     let quantities: Vec<_> = study.point_quantities.iter().filter(|q| q.motion.is_acceleration()).collect();
-    if quantities.is_empty() && loops.rows.is_empty() {
-        return Vec::new();
+    if quantities.is_empty() {
+        return;
     }
     let spatial: Vec<SpatialMotion> = kinematics::accelerations(graph, tree, frames, &joint_accelerations);
     for quantity in quantities {
@@ -234,5 +233,4 @@ fn add_accelerations(
         };
         meaning.insert(quantity.symbol, value[quantity.axis]);
     }
-    loops.rows.iter().map(|row| row.acceleration(graph, frames, &spatial)).collect()
 }

@@ -184,7 +184,7 @@ pub fn emit_model(study: &Study, system: &System) -> String {
         "\n{} bodies, {} joints{loops}, {} degrees of freedom",
         study.bodies.len(),
         study.joints.len(),
-        velocities.saturating_sub(system.hidden.len())
+        velocities.saturating_sub(system.loop_constraints)
     );
     let _ = writeln!(
         text,

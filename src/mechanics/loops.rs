@@ -1,11 +1,11 @@
-//! Joints that close kinematic loops, as constraints on position, velocity and acceleration level.
+//! Joints that close kinematic loops, as constraints on position and velocity level.
 //!
 //! A row is the dot product of two vectors that move with the bodies; its rate is a linear function of the velocities, and
 //! a multiplier acts on the bodies by exactly the transpose of that function.
 
 use super::articulated::Wrench;
 use super::forces::{Effect, ForceGeometry};
-use super::kinematics::{self, FrameMotion, SpatialMotion};
+use super::kinematics::{self, FrameMotion};
 use super::topology::{Seat, Tree};
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::vector::{self, Vector};
@@ -244,52 +244,6 @@ impl Row {
             Geometry::Distance(length) => {
                 let rate = vector::dot(graph, moving.distance, moving.relative_velocity);
                 graph.divide(rate, length)
-            }
-        }
-    }
-
-    /// d2g/dt2, from the links' accelerations.
-    pub fn acceleration(&self, graph: &mut Graph, frames: &[FrameMotion], spatial: &[SpatialMotion]) -> Node {
-        let moving = self.moving(graph, frames);
-        let [u, w] = self.directions(graph, frames);
-        let Ends { parent, child } = self.ends;
-        let [a_p, a_c] = [parent, child].map(|end| kinematics::point_acceleration(graph, frames, spatial, end));
-        let relative = vector::subtract(graph, a_c, a_p);
-        let [alpha_p, alpha_c] =
-            [parent, child].map(|end| kinematics::angular_acceleration(graph, frames, spatial, end.link));
-        let [omega_p, omega_c] = moving.turning;
-        match self.geometry {
-            Geometry::Fixed(_) => vector::dot(graph, u, relative),
-            Geometry::Carried(_) => {
-                let swept = vector::cross(graph, omega_p, moving.distance);
-                let seen = vector::subtract(graph, moving.relative_velocity, swept);
-                let turned = vector::cross(graph, omega_p, u);
-                let by_turning = vector::dot(graph, turned, seen);
-                let angular = vector::cross(graph, alpha_p, moving.distance);
-                let coriolis = vector::cross(graph, omega_p, moving.relative_velocity);
-                let relative = vector::subtract(graph, relative, angular);
-                let relative = vector::subtract(graph, relative, coriolis);
-                let along = vector::dot(graph, u, relative);
-                graph.add(along, by_turning)
-            }
-            Geometry::Angle { .. } => {
-                let about = vector::cross(graph, w, u);
-                let angular = vector::subtract(graph, alpha_c, alpha_p);
-                let first = vector::dot(graph, angular, about);
-                let w_rate = vector::cross(graph, omega_c, w);
-                let u_rate = vector::cross(graph, omega_p, u);
-                let one = vector::cross(graph, w_rate, u);
-                let other = vector::cross(graph, w, u_rate);
-                let about_rate = vector::add(graph, one, other);
-                let relative = vector::subtract(graph, omega_c, omega_p);
-                let second = vector::dot(graph, relative, about_rate);
-                graph.add(first, second)
-            }
-            Geometry::Distance(length) => {
-                let square = vector::dot(graph, moving.relative_velocity, moving.relative_velocity);
-                let along = vector::dot(graph, moving.distance, relative);
-                let sum = graph.add(square, along);
-                graph.divide(sum, length)
             }
         }
     }

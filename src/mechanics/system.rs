@@ -24,10 +24,8 @@ pub struct System {
     pub constraints: Vec<Node>,
     /// In the study's words, one per constraint.
     pub constraint_names: Vec<String>,
-    /// Time derivatives of the velocity constraints: they determine the first algebraic variables, one each.
-    pub hidden: Vec<Node>,
-    /// True per algebraic variable that is a multiplier: its constraint does not contain it.
-    pub index_two: Vec<bool>,
+    /// Number of constraints that closed loops leave, each with one multiplier on either level.
+    pub loop_constraints: usize,
     /// What was found on the way and changes nothing: redundant constraints.
     pub warnings: Vec<Diagnostic>,
     pub parameters: Vec<Symbol>,
@@ -87,7 +85,7 @@ impl System {
             let new = self.graph.substitute(&old, &replacements);
             nodes.into_iter().zip(new).for_each(|(node, new)| *node = new);
         };
-        substitute(self.rates.iter_mut().chain(&mut self.constraints).chain(&mut self.hidden).collect());
+        substitute(self.rates.iter_mut().chain(&mut self.constraints).collect());
         substitute(self.outputs.iter_mut().chain(&mut self.probes).map(|output| &mut output.value).collect());
         substitute(
             self.starts
