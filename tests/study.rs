@@ -1,9 +1,13 @@
 //! The check of studies: what laws and effects become, and how errors read.
 
+#[path = "study/actuators.rs"]
+mod actuators;
 #[path = "study/evaluate.rs"]
 mod evaluate;
 #[path = "study/inlining.rs"]
 mod inlining;
+#[path = "study/laws.rs"]
+mod laws;
 #[path = "study/models.rs"]
 mod models;
 #[path = "study/prelude.rs"]

@@ -28,7 +28,7 @@ fn record(study: &Study, index: usize, step: f64, outputs: Vec<usize>) -> Record
     breakpoints.sort_by(f64::total_cmp);
     breakpoints.dedup();
     // The last instant is the end, even where the step does not divide the duration.
-    let count = (manoeuvre.duration / step * (1.0 + 1e-12)).ceil().max(1.0) as usize;
+    let count = (manoeuvre.duration / step * (1.0 - 1e-12)).ceil().max(1.0) as usize;
     let step = manoeuvre.duration / count as f64;
     let experiment = study.experiments.len() + index;
     let channels = formulas.into_iter().map(Channel::Formula).collect();
