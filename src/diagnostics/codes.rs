@@ -335,7 +335,7 @@ codes! {
     CLOSED_LOOP "E0302" "joint cannot close its loop"
     "Joints form loops; the tool lets all but one of them carry bodies and turns the last into constraints. Joints that carry force\n\
      elements are kept, then those with the least freedom; among equals the last one declared closes the loop. A joint whose motion\n\
-     is prescribed, or whose shifts stand behind turns, cannot be the one that closes: declare it earlier.\n\
+     is prescribed, or that shifts on both sides of a turn, cannot be the one that closes: another one of the loop must be.\n\
      \n\
      \x20   joint coupler: revolute(y) crank.tip -> rod\n"
 

@@ -29,7 +29,12 @@ pub(super) fn assemble(
 ) -> Result<System, Vec<Diagnostic>> {
     let moving: Vec<usize> = tree.links_of_joint.iter().flatten().copied().collect();
     let projection = loops.projection(&mut graph, tree, frames);
-    let states = state_variables(study, tree, &moving);
+    let mut states = state_variables(study, tree, &moving);
+    if let Some(closed) = loops.closed.first() {
+        states
+            .iter_mut()
+            .for_each(|state| state.reference = closed.get(&state.symbol).copied().unwrap_or(state.reference));
+    }
     let mut rates: Vec<Node> =
         moving.iter().flat_map(|&link| position_rates(&mut graph, tree, link, &projection)).collect();
     let free = moving.iter().filter(|&&link| tree.links[link].free_symbols().is_some());
@@ -42,7 +47,7 @@ pub(super) fn assemble(
     let name_and_value = |((name, ..), value): ((&str, Node, Span), Node)| Output { name: name.to_owned(), value };
     let outputs: Vec<Output> = study.outputs().zip(values).map(name_and_value).collect();
     let probes = probes(&mut graph, study, meaning);
-    let starts = all_starts(&mut graph, study, &states, meaning)?;
+    let starts = all_starts(&mut graph, study, &states, meaning, &loops.closed)?;
     let (algebraic, constraints, constraint_names) = algebraic_part(&mut graph, study, &loops, &reactions);
 
     let system = System {
@@ -176,17 +181,24 @@ fn all_starts(
     study: &Study,
     states: &[Variable],
     meaning: &HashMap<Symbol, Node>,
+    closed: &[HashMap<Symbol, f64>],
 ) -> Result<Vec<Vec<StartEquation>>, Vec<Diagnostic>> {
     let initial: Vec<Node> = study.states.iter().map(|state| state.initial).collect();
     let initial = graph.substitute(&initial, meaning);
     let initial: HashMap<Symbol, Node> = study.states.iter().map(|state| state.symbol).zip(initial).collect();
     let mut result = Vec::new();
     let mut errors = Vec::new();
-    for (name, start, span) in study.starts() {
+    for (number, (name, start, span)) in study.starts().enumerate() {
+        let mut states = states.to_vec();
+        if let Some(closed) = closed.get(number) {
+            states
+                .iter_mut()
+                .for_each(|state| state.reference = closed.get(&state.symbol).copied().unwrap_or(state.reference));
+        }
         let values: Vec<Node> = start.overrides.iter().map(|&(_, value)| value).collect();
         let values = graph.substitute(&values, meaning);
         let overrides: Vec<(Symbol, Node)> = start.overrides.iter().map(|&(symbol, _)| symbol).zip(values).collect();
-        match starts(graph, states, (&name, start.base, span), &initial, &overrides) {
+        match starts(graph, &states, (&name, start.base, span), &initial, &overrides) {
             Ok(equations) => result.push(equations),
             Err(found) => errors.extend(found),
         }

@@ -1,197 +1,73 @@
-//! Can the loops be closed, and which of their constraints say something new? Answered at one configuration near the start.
+//! Can the loops be closed, and which of their constraints say something new? Answered near every start of the study.
 
+use super::linkage::Linkage;
 use super::loops::{Direction, Row};
 use super::topology::{Coordinate, Tree};
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::{Graph, Node, Symbol};
-use crate::linear::SingularValueDecomposition;
-use crate::study::{JointKind, Study};
+use crate::study::{JointKind, Start, Study};
 use std::collections::HashMap;
 
 /// What was found out about the constraints.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Assembly {
     /// Rows that are independent of those before them.
     pub kept: Vec<usize>,
+    /// Per start of the study ([`Study::starts`]), positions at which the loops are closed; the first entry stands for a study
+    /// without any.
+    pub positions: Vec<HashMap<Symbol, f64>>,
     pub warnings: Vec<Diagnostic>,
 }
 
 /// A row whose part independent of the rows before is smaller than this, relative to the row, is redundant.
 const INDEPENDENT: f64 = 1e-7;
-/// Loops count as closed below this error (m, rad).
-const CLOSED: f64 = 1e-9;
-const LARGEST_STEP: f64 = 0.3;
-const MOST_STEPS: usize = 200;
-/// How far the configuration judged is from the start (m and rad): symmetric positions have constraints that depend on each
-/// other only there.
-const ASIDE: f64 = 0.03;
+
+/// The constraints as expressions: positions and velocities per row, cosines that are positive where no joint is turned over.
+pub(super) struct Constraints<'a> {
+    pub rows: &'a [Row],
+    pub positions: &'a [Node],
+    pub velocities: &'a [Node],
+    pub upright: &'a [Node],
+}
 
 /// # Errors
-/// Loops that cannot be closed near the start; mechanisms that cannot move.
+/// Loops that cannot be closed near a start; mechanisms that cannot move.
 pub(super) fn assemble_loops(
     graph: &Graph,
     study: &Study,
     tree: &Tree,
-    rows: &[Row],
-    (positions, velocities): (&[Node], &[Node]),
+    constraints: &Constraints,
 ) -> Result<Assembly, Vec<Diagnostic>> {
+    let rows = constraints.rows;
     if rows.is_empty() {
-        return Ok(Assembly { kept: vec![], warnings: vec![] });
+        return Ok(Assembly::default());
     }
-    let mut mechanism = Mechanism::new(graph, study, tree, positions, velocities);
-    let start = mechanism.values.clone();
-    mechanism.move_aside();
-    if mechanism.close().is_err() {
-        mechanism.values = start;
-        mechanism.close().map_err(|residual| vec![not_closed(study, rows, &residual)])?;
+    let mut linkage = Linkage::new(graph, study, tree, constraints);
+    let drawn = Start { base: crate::study::StartBase::Rest, overrides: vec![] };
+    let mut starts: Vec<Start> = study.starts().map(|(_, start, _)| start.clone()).collect();
+    if starts.is_empty() {
+        starts.push(drawn);
     }
-    let jacobian = mechanism.jacobian();
+    let mut positions: Vec<HashMap<Symbol, f64>> = Vec::new();
+    let mut known: Vec<(HashMap<Symbol, f64>, HashMap<Symbol, f64>)> = Vec::new();
+    for start in &starts {
+        let given = linkage.given(study, start);
+        if let Some((_, closed)) = known.iter().find(|(before, _)| *before == given) {
+            positions.push(closed.clone());
+            continue;
+        }
+        let closed = linkage.assembled(&given).map_err(|residual| vec![not_closed(study, rows, &residual)])?;
+        known.push((given, closed.clone()));
+        positions.push(closed);
+    }
+    let jacobian = linkage.general_jacobian(&positions[0]);
     let kept = independent_rows(&jacobian, rows);
-    let freedom = mechanism.rates.len() - kept.len();
+    let freedom = linkage.freedom() - kept.len();
     let is_driven = tree.links.iter().any(|link| matches!(link.coordinate, Coordinate::Prescribed { .. }));
     if freedom == 0 && !is_driven {
         return Err(vec![cannot_move(study, rows)]);
     }
-    Ok(Assembly { warnings: redundancies(study, rows, &kept), kept })
-}
-
-/// The constraints as functions of the coordinates.
-struct Mechanism {
-    graph: Graph,
-    positions: Vec<Node>,
-    velocities: Vec<Node>,
-    /// Symbols of the free rates, in order of the links.
-    rates: Vec<Symbol>,
-    /// Per free rate what it changes.
-    changes: Vec<Change>,
-    values: HashMap<Symbol, f64>,
-}
-
-enum Change {
-    Coordinate(Symbol),
-    Quaternion([Symbol; 4], usize),
-}
-
-impl Mechanism {
-    fn new(graph: &Graph, study: &Study, tree: &Tree, positions: &[Node], velocities: &[Node]) -> Self {
-        let (small, nodes) = graph.extract(&[positions, velocities].concat());
-        let (positions, velocities) = nodes.split_at(positions.len());
-        let mut values: HashMap<Symbol, f64> = study.parameters.iter().map(|p| (p.symbol, p.start)).collect();
-        let (mut rates, mut changes) = (Vec::new(), Vec::new());
-        for link in &tree.links {
-            match link.coordinate {
-                Coordinate::Free { symbols, .. } => {
-                    rates.push(symbols.velocity);
-                    changes.push(Change::Coordinate(symbols.position));
-                    values.insert(symbols.position, 0.0);
-                }
-                Coordinate::Rotation { symbols, component } => {
-                    rates.push(symbols.velocity[component]);
-                    changes.push(Change::Quaternion(symbols.quaternion, component));
-                    symbols.quaternion.iter().enumerate().for_each(|(i, &s)| {
-                        values.insert(s, f64::from(u8::from(i == 0)));
-                    });
-                }
-                Coordinate::Prescribed { .. } | Coordinate::Weld => {}
-            }
-        }
-        // The first experiment says how the mechanism stands, as far as numbers and parameters go.
-        if let Some(experiment) = study.experiments.first() {
-            let known = values.clone();
-            for &(symbol, node) in &experiment.start.overrides {
-                let value = study.graph.evaluate(&[node], |s| known.get(&s).copied().unwrap_or(0.0), |_, _, _| 0.0)[0];
-                if values.contains_key(&symbol) && value.is_finite() {
-                    values.insert(symbol, value);
-                }
-            }
-        }
-        Self { positions: positions.to_vec(), velocities: velocities.to_vec(), graph: small, rates, changes, values }
-    }
-
-    fn residual(&self) -> Vec<f64> {
-        self.graph.evaluate(&self.positions, |s| self.values.get(&s).copied().unwrap_or(0.0), |_, _, _| 0.0)
-    }
-
-    /// dg/dt per rate: m x n, column-major.
-    fn jacobian(&self) -> Vec<f64> {
-        let at = |moving: Option<Symbol>| {
-            let value = |s: Symbol| {
-                if Some(s) == moving { 1.0 } else { self.values.get(&s).copied().unwrap_or(0.0) }
-            };
-            self.graph.evaluate(&self.velocities, value, |_, _, _| 0.0)
-        };
-        let resting = at(None);
-        self.rates
-            .iter()
-            .flat_map(|&rate| at(Some(rate)).into_iter().zip(&resting).map(|(v, r)| v - r).collect::<Vec<_>>())
-            .collect()
-    }
-
-    fn advance(&mut self, step: &[f64]) {
-        for (change, &amount) in self.changes.iter().zip(step) {
-            match change {
-                Change::Coordinate(symbol) => *self.values.entry(*symbol).or_insert(0.0) += amount,
-                Change::Quaternion(symbols, component) => {
-                    let q = symbols.map(|s| self.values.get(&s).copied().unwrap_or(0.0));
-                    let half = 0.5 * amount;
-                    let [w, x, y, z] = q;
-                    // q + q (0, half e_component)
-                    let change = match component {
-                        0 => [-x, w, z, -y],
-                        1 => [-y, -z, w, x],
-                        _ => [-z, y, -x, w],
-                    };
-                    let moved: [f64; 4] = std::array::from_fn(|i| q[i] + half * change[i]);
-                    let norm = moved.iter().map(|v| v * v).sum::<f64>().sqrt();
-                    symbols.iter().zip(moved).for_each(|(&s, v)| {
-                        self.values.insert(s, v / norm);
-                    });
-                }
-            }
-        }
-    }
-
-    /// A fixed pattern of small motions, different for every coordinate.
-    fn move_aside(&mut self) {
-        let step: Vec<f64> = (0..self.rates.len()).map(|i| ASIDE * (1.0 + (i as f64 * 2.4).sin()) / 2.0).collect();
-        self.advance(&step);
-    }
-
-    /// Newton's method with the shortest steps (Gauss-Newton). The residual where it got stuck otherwise.
-    fn close(&mut self) -> Result<(), Vec<f64>> {
-        let largest = |values: &[f64]| {
-            values.iter().fold(0.0_f64, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(v.abs()) })
-        };
-        let mut residual = self.residual();
-        for _ in 0..MOST_STEPS {
-            if largest(&residual) < CLOSED {
-                return Ok(());
-            }
-            let Some(mut step) = self.shortest_step(&residual) else { break };
-            let size = largest(&step);
-            if size > LARGEST_STEP {
-                step.iter_mut().for_each(|s| *s *= LARGEST_STEP / size);
-            }
-            if size < 1e-14 {
-                break;
-            }
-            self.advance(&step);
-            residual = self.residual();
-        }
-        if largest(&residual) < CLOSED { Ok(()) } else { Err(residual) }
-    }
-
-    fn shortest_step(&self, residual: &[f64]) -> Option<Vec<f64>> {
-        let (m, n) = (residual.len(), self.rates.len());
-        let svd = SingularValueDecomposition::new(m, n, &self.jacobian()).ok()?;
-        let mut step = vec![0.0; n];
-        for j in 0..svd.rank(1e-9) {
-            let along: f64 = svd.left(j).iter().zip(residual).map(|(u, r)| u * r).sum();
-            let factor = -along / svd.singular_values[j];
-            step.iter_mut().zip(svd.right(j)).for_each(|(s, v)| *s += factor * v);
-        }
-        step.iter().all(|s| s.is_finite()).then_some(step)
-    }
+    Ok(Assembly { warnings: redundancies(study, rows, &kept), kept, positions })
 }
 
 /// Gram-Schmidt over the rows, shifts before turns: a mechanism loses turning constraints first.

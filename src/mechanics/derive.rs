@@ -2,10 +2,10 @@
 
 use super::articulated::{self, Accelerated, Inertia, Wrench};
 use super::assemble::assemble;
+use super::closing::closing_coordinate;
 use super::forces::{self, Effect, ForceGeometry};
 use super::inertia::refuse_missing_inertia;
 use super::kinematics::{self, FrameMotion, SpatialMotion};
-use super::loops;
 use super::multipliers::Loops;
 use super::reactions::add_reactions;
 use super::system::System;
@@ -101,7 +101,7 @@ fn kinematic_meaning(
     }
     for (number, joint) in study.joints.iter().enumerate().filter(|(_, joint)| joint.closes_loop) {
         for (at, axis) in joint.axes.iter().enumerate() {
-            if let Some(geometry) = loops::closing_coordinate(graph, study, tree, frames, (number, at)) {
+            if let Some(geometry) = closing_coordinate(graph, study, tree, frames, (number, at)) {
                 meaning.insert(axis.symbols.position, geometry.coordinate);
                 meaning.insert(axis.symbols.velocity, geometry.rate);
             }

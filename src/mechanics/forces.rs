@@ -1,12 +1,12 @@
 //! Force elements: elongation, rate, and what a unit of load does to the links.
 
 use super::articulated::Wrench;
+use super::closing::at_closing_joint;
 use super::kinematics::{self, FrameMotion};
-use super::loops;
 use super::topology::{Coordinate, Seat, Tree};
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::vector::{self, Matrix, Vector};
-use crate::expression::{Binary, Graph, Node, Unary};
+use crate::expression::{Graph, Node, Unary};
 use crate::study::{Force, ForceDirection, ForcePlace, Motion, Study};
 
 /// Geometry of one force element.
@@ -35,7 +35,7 @@ pub(super) fn geometry(
 ) -> Result<ForceGeometry, Diagnostic> {
     match &force.place {
         ForcePlace::Joint { joint, axis } if study.joints[*joint].closes_loop => {
-            loops::at_closing_joint(graph, study, tree, frames, force, (*joint, *axis))
+            at_closing_joint(graph, study, tree, frames, force, (*joint, *axis))
         }
         ForcePlace::Joint { joint, axis } => at_joint(graph, study, tree, force, (*joint, *axis)),
         ForcePlace::Between { first, second, along, free_length } => {
@@ -151,17 +151,25 @@ fn about_axis(
     let carrier = kinematics::orientation(graph, frames, seat.link);
     let angle_of = |graph: &mut Graph, orientation: Matrix| {
         let turned = vector::apply(graph, orientation, across);
-        let [x, y] = [across, beyond].map(|v| {
-            let v = vector::apply(graph, carrier, v);
-            vector::dot(graph, v, turned)
-        });
-        graph.binary(Binary::Atan2, y, x)
+        let plane = [across, beyond].map(|v| vector::apply(graph, carrier, v));
+        kinematics::angle(graph, plane, turned)
     };
     let angles = [first, second].map(|orientation| angle_of(graph, orientation));
     let coordinate = graph.subtract(angles[1], angles[0]);
     let [slow, fast] = links.map(|link| kinematics::angular_velocity(graph, frames, link));
     let relative = vector::subtract(graph, fast, slow);
     let rate = vector::dot(graph, axis, relative);
+    let wrenches = opposite_moments(graph, frames, links, axis);
+    ForceGeometry { coordinate, rate, effect: Effect::Links(wrenches) }
+}
+
+/// A unit moment about `axis` (ground axes) on the second link, reversed on the first.
+pub(super) fn opposite_moments(
+    graph: &mut Graph,
+    frames: &[FrameMotion],
+    links: [Option<usize>; 2],
+    axis: Vector,
+) -> Vec<(usize, Wrench)> {
     let reversed = vector::negate(graph, axis);
     let mut wrenches = Vec::new();
     for (link, moment) in links.into_iter().zip([reversed, axis]) {
@@ -169,7 +177,7 @@ fn about_axis(
         let moment = vector::apply_transposed(graph, frames[link].orientation, moment);
         wrenches.push((link, Wrench { moment, force: vector::zero(graph) }));
     }
-    ForceGeometry { coordinate, rate, effect: Effect::Links(wrenches) }
+    wrenches
 }
 
 /// Signed displacement of the second point against the first along a ground-fixed axis.

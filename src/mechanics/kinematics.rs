@@ -2,7 +2,7 @@
 
 use super::topology::{Axis, Coordinate, Link, Seat, Tree};
 use crate::expression::vector::{self, Matrix, Vector};
-use crate::expression::{Graph, Node};
+use crate::expression::{Binary, Graph, Node};
 
 /// Motion of one link's frame. Vectors are in the link's axes unless stated.
 #[derive(Clone, Debug)]
@@ -155,6 +155,13 @@ pub(super) fn angular_velocity(graph: &mut Graph, frames: &[FrameMotion], link: 
         None => vector::zero(graph),
         Some(link) => vector::apply(graph, frames[link].orientation, frames[link].angular_velocity),
     }
+}
+
+/// The angle by which a direction has turned from `across` towards `beyond`, which are perpendicular.
+pub(super) fn angle(graph: &mut Graph, [across, beyond]: [Vector; 2], turned: Vector) -> Node {
+    let x = vector::dot(graph, across, turned);
+    let y = vector::dot(graph, beyond, turned);
+    graph.binary(Binary::Atan2, y, x)
 }
 
 /// Angular acceleration of a frame, ground axes.

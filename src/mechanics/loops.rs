@@ -4,19 +4,64 @@
 //! a multiplier acts on the bodies by exactly the transpose of that function.
 
 use super::articulated::Wrench;
-use super::forces::{Effect, ForceGeometry};
 use super::kinematics::{self, FrameMotion};
 use super::topology::{Seat, Tree};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::expression::vector::{self, Vector};
-use crate::expression::{Binary, Graph, Node};
-use crate::study::{AxisMotion, Force, Joint, JointKind, Study};
+use crate::expression::vector::{self, Matrix, Vector};
+use crate::expression::{Graph, Node};
+use crate::study::{AxisMotion, Joint, JointKind, Study};
 
-/// The two ends of a closing joint.
+/// The two ends of a closing joint, in the order in which its shifts come before its turns: from parent to child, or, of a
+/// joint that turns first, from child to parent.
 #[derive(Clone, Copy, Debug)]
-struct Ends {
-    parent: Seat,
-    child: Seat,
+pub(super) struct Ends {
+    pub near: Seat,
+    pub far: Seat,
+    /// The joint's axes (the parent's, at the joint's coordinates zero) to the axes of the links of either end.
+    near_axes: Matrix,
+    far_axes: Matrix,
+    pub is_swapped: bool,
+}
+
+impl Ends {
+    pub fn new(graph: &mut Graph, tree: &Tree, joint: &Joint) -> Self {
+        let [parent, child] = [&joint.parent, &joint.child].map(|end| tree.place(graph, end));
+        let child_axes = match joint.orientation {
+            None => child.rotation,
+            Some(matrix) => vector::multiply(graph, child.rotation, vector::transpose(matrix)),
+        };
+        if joint.axes.is_empty() || leading_shifts(joint.axes.iter().map(|axis| axis.motion)) {
+            Ends { near: parent, far: child, near_axes: parent.rotation, far_axes: child_axes, is_swapped: false }
+        } else {
+            Ends { near: child, far: parent, near_axes: child_axes, far_axes: parent.rotation, is_swapped: true }
+        }
+    }
+
+    /// Vectors of the links of either end in ground axes.
+    pub fn in_ground(&self, graph: &mut Graph, frames: &[FrameMotion], [near, far]: [Vector; 2]) -> [Vector; 2] {
+        let [r_near, r_far] = [self.near, self.far].map(|end| kinematics::orientation(graph, frames, end.link));
+        [vector::apply(graph, r_near, near), vector::apply(graph, r_far, far)]
+    }
+
+    /// A direction given in the joint's axes as vectors fixed to the links of either end.
+    pub fn carried(&self, graph: &mut Graph, direction: [f64; 3]) -> [Vector; 2] {
+        let direction = vector::constant(graph, direction);
+        [self.near_axes, self.far_axes].map(|axes| vector::apply(graph, axes, direction))
+    }
+}
+
+impl Ends {
+    /// The distance along a direction of the near link, in the form of a constraint.
+    pub fn along(&self, direction: Vector) -> Row {
+        let geometry = Geometry::Carried(direction);
+        Row { joint: 0, holds: String::new(), direction: Direction::Distance, ends: *self, geometry }
+    }
+}
+
+/// Whether no shift comes behind a turn.
+fn leading_shifts(motions: impl Iterator<Item = AxisMotion>) -> bool {
+    let is_turn: Vec<bool> = motions.map(|motion| matches!(motion, AxisMotion::Turn(_))).collect();
+    is_turn.is_sorted()
 }
 
 /// One constraint `0 = g(q, t)`.
@@ -44,10 +89,10 @@ pub(super) enum Direction {
 enum Geometry {
     /// A ground-fixed direction times the distance vector.
     Fixed(Vector),
-    /// A direction of the parent's link (link axes) times the distance vector.
+    /// A direction of the near link (link axes) times the distance vector.
     Carried(Vector),
-    /// A direction of the parent's link times one of the child's link, minus their product in the reference configuration.
-    Angle { parent: Vector, child: Vector },
+    /// A direction of the near link times one of the far link, minus their product at the joint's coordinates zero.
+    Angle { near: Vector, far: Vector, drawn: f64 },
     /// Distance of the points, m.
     Distance(Node),
 }
@@ -60,7 +105,7 @@ pub(super) fn rows(graph: &mut Graph, study: &Study, tree: &Tree) -> Result<Vec<
     let mut rows = Vec::new();
     let mut errors = Vec::new();
     for (index, joint) in study.joints.iter().enumerate().filter(|(_, joint)| joint.closes_loop) {
-        let ends = Ends { parent: tree.place(graph, &joint.parent), child: tree.place(graph, &joint.child) };
+        let ends = Ends::new(graph, tree, joint);
         if let Some(axis) = joint.axes.iter().find(|axis| axis.prescribed.is_some()) {
             errors.push(prescribed_in_loop(joint, &axis.name));
             continue;
@@ -72,9 +117,9 @@ pub(super) fn rows(graph: &mut Graph, study: &Study, tree: &Tree) -> Result<Vec<
             add((Direction::Distance, Geometry::Distance(length)));
             continue;
         }
-        match (position_rows(graph, joint, ends), angle_rows(graph, joint, ends)) {
-            (Some(positions), Some(angles)) => positions.into_iter().chain(angles).for_each(add),
-            _ => errors.push(no_constraint_form(joint)),
+        match position_rows(graph, joint, &ends) {
+            Some(positions) => positions.into_iter().chain(angle_rows(graph, joint, &ends)).for_each(add),
+            None => errors.push(no_constraint_form(joint)),
         }
     }
     if errors.is_empty() { Ok(rows) } else { Err(errors) }
@@ -96,8 +141,8 @@ fn without_sign(axis: [f64; 3]) -> [f64; 3] {
 
 fn no_constraint_form(joint: &Joint) -> Diagnostic {
     Diagnostic::error(Code::CLOSED_LOOP, format!("joint `{}` cannot close its loop", joint.name))
-        .label(joint.span, "a shift behind a turn, or more than one shift direction that turns")
-        .help("list its shifts first, `axes(shift y, turn z)`; or let another joint close the loop: the one with the most freedom does, among equals the last declared")
+        .label(joint.span, "it shifts on both sides of a turn")
+        .help("list its shifts first, `axes(shift y, shift x, turn z)`, or its turns; or let it have one shift only")
 }
 
 fn prescribed_in_loop(joint: &Joint, axis: &str) -> Diagnostic {
@@ -111,14 +156,14 @@ fn prescribed_in_loop(joint: &Joint, axis: &str) -> Diagnostic {
     )
 }
 
-/// Directions in the parent's axes that the leading shifts leave held. `None`: a shift behind a turn.
-fn position_rows(graph: &mut Graph, joint: &Joint, ends: Ends) -> Option<Vec<(Direction, Geometry)>> {
-    let shifts: Vec<[f64; 3]> =
-        joint.axes.iter().filter(|a| matches!(a.motion, AxisMotion::Shift(_))).map(|a| a.motion.direction()).collect();
-    let leads = joint.axes.iter().take(shifts.len()).all(|axis| matches!(axis.motion, AxisMotion::Shift(_)));
-    if !leads {
+/// Directions that the shifts leave held. `None`: shifts on both sides of a turn.
+fn position_rows(graph: &mut Graph, joint: &Joint, ends: &Ends) -> Option<Vec<(Direction, Geometry)>> {
+    let motions = || joint.axes.iter().map(|axis| axis.motion);
+    if !leading_shifts(motions()) && !leading_shifts(motions().rev()) {
         return None;
     }
+    let shifts: Vec<[f64; 3]> =
+        motions().filter(|motion| matches!(motion, AxisMotion::Shift(_))).map(AxisMotion::direction).collect();
     let held: Vec<[f64; 3]> = match shifts.as_slice() {
         [] => {
             return Some((0..3).map(|i| fixed(graph, i)).collect());
@@ -128,8 +173,8 @@ fn position_rows(graph: &mut Graph, joint: &Joint, ends: Ends) -> Option<Vec<(Di
         _ => vec![],
     };
     let rows = held.into_iter().map(|direction| {
-        let axis = vector::constant(graph, direction);
-        (Direction::Shift(direction), Geometry::Carried(vector::apply(graph, ends.parent.rotation, axis)))
+        let [near, _] = ends.carried(graph, direction);
+        (Direction::Shift(direction), Geometry::Carried(near))
     });
     Some(rows.collect())
 }
@@ -145,29 +190,59 @@ fn normal(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     product.map(|x| x / length)
 }
 
-/// Pairs of directions that stay perpendicular (at their reference angle).
-fn angle_rows(graph: &mut Graph, joint: &Joint, ends: Ends) -> Option<Vec<(Direction, Geometry)>> {
+/// Pairs of directions that keep the angle between them.
+fn angle_rows(graph: &mut Graph, joint: &Joint, ends: &Ends) -> Vec<(Direction, Geometry)> {
     if joint.rotation.is_some() {
-        return Some(vec![]);
+        return vec![];
     }
-    let turns: Vec<[f64; 3]> =
-        joint.axes.iter().filter(|a| matches!(a.motion, AxisMotion::Turn(_))).map(|a| a.motion.direction()).collect();
-    let unit = |i: usize| -> [f64; 3] { std::array::from_fn(|k| if k == i { 1.0 } else { 0.0 }) };
-    // Each pair: direction of the parent, direction of the child (both in parent axes of the reference configuration).
+    let mut turns = turns(joint);
+    if ends.is_swapped {
+        turns.reverse();
+    }
+    // Each pair: direction of the near end, direction of the far end.
     let pairs: Vec<([f64; 3], [f64; 3])> = match turns.as_slice() {
         [] => (0..3).map(|i| (unit(i), unit((i + 1) % 3))).collect(),
         [axis] => vector::perpendicular(*axis).map(|across| (across, *axis)).to_vec(),
         [first, second] => vec![(*first, *second)],
         _ => vec![],
     };
-    let rows = pairs.into_iter().map(|(of_parent, of_child)| {
-        let [parent, child] = [of_parent, of_child].map(|direction| {
-            let direction = vector::constant(graph, direction);
-            vector::apply(graph, ends.parent.rotation, direction)
-        });
-        (Direction::Turn(normal(of_parent, of_child)), Geometry::Angle { parent, child })
+    let rows = pairs.into_iter().map(|(of_near, of_far)| {
+        let [near, _] = ends.carried(graph, of_near);
+        let [_, far] = ends.carried(graph, of_far);
+        let drawn: f64 = of_near.iter().zip(of_far).map(|(a, b)| a * b).sum();
+        let drawn = if drawn.abs() < f64::EPSILON { 0.0 } else { drawn };
+        (Direction::Turn(normal(of_near, of_far)), Geometry::Angle { near, far, drawn })
     });
-    Some(rows.collect())
+    rows.collect()
+}
+
+fn turns(joint: &Joint) -> Vec<[f64; 3]> {
+    let is_turn = |motion: &AxisMotion| matches!(motion, AxisMotion::Turn(_));
+    joint.axes.iter().map(|axis| axis.motion).filter(is_turn).map(AxisMotion::direction).collect()
+}
+
+fn unit(index: usize) -> [f64; 3] {
+    std::array::from_fn(|k| if k == index { 1.0 } else { 0.0 })
+}
+
+/// Cosines that are one where a joint is closed as meant and not turned over: rows of angles hold in both positions.
+pub(super) fn upright(graph: &mut Graph, study: &Study, tree: &Tree, frames: &[FrameMotion]) -> Vec<Node> {
+    let mut cosines = Vec::new();
+    for joint in study.joints.iter().filter(|joint| joint.closes_loop && joint.rotation.is_none()) {
+        let ends = Ends::new(graph, tree, joint);
+        let kept: Vec<[f64; 3]> = match (joint.kind, turns(joint).as_slice()) {
+            (JointKind::Distance, _) => vec![],
+            (_, []) => (0..3).map(unit).collect(),
+            (_, [axis]) => vec![*axis],
+            _ => vec![],
+        };
+        for direction in kept {
+            let directions = ends.carried(graph, direction);
+            let [near, far] = ends.in_ground(graph, frames, directions);
+            cosines.push(vector::dot(graph, near, far));
+        }
+    }
+    cosines
 }
 
 /// Positions and velocities that a row needs, ground axes.
@@ -179,10 +254,10 @@ struct Moving {
 
 impl Row {
     fn moving(&self, graph: &mut Graph, frames: &[FrameMotion]) -> Moving {
-        let Ends { parent, child } = self.ends;
-        let [p, c] = [parent, child].map(|end| kinematics::point_position(graph, frames, end));
-        let [v_p, v_c] = [parent, child].map(|end| kinematics::point_velocity(graph, frames, end));
-        let turning = [parent, child].map(|end| kinematics::angular_velocity(graph, frames, end.link));
+        let ends = [self.ends.near, self.ends.far];
+        let [p, c] = ends.map(|end| kinematics::point_position(graph, frames, end));
+        let [v_p, v_c] = ends.map(|end| kinematics::point_velocity(graph, frames, end));
+        let turning = ends.map(|end| kinematics::angular_velocity(graph, frames, end.link));
         Moving {
             distance: vector::subtract(graph, c, p),
             relative_velocity: vector::subtract(graph, v_c, v_p),
@@ -190,17 +265,14 @@ impl Row {
         }
     }
 
-    /// Directions of parent and child in ground axes.
+    /// Directions of the near and the far link in ground axes.
     fn directions(&self, graph: &mut Graph, frames: &[FrameMotion]) -> [Vector; 2] {
-        let (parent, child) = match self.geometry {
-            Geometry::Fixed(u) => return [u, u],
-            Geometry::Carried(u) => (u, u),
-            Geometry::Angle { parent, child } => (parent, child),
-            Geometry::Distance(_) => return [vector::zero(graph); 2],
-        };
-        let [r_p, r_c] =
-            [self.ends.parent, self.ends.child].map(|end| kinematics::orientation(graph, frames, end.link));
-        [vector::apply(graph, r_p, parent), vector::apply(graph, r_c, child)]
+        match self.geometry {
+            Geometry::Fixed(u) => [u, u],
+            Geometry::Carried(u) => self.ends.in_ground(graph, frames, [u, u]),
+            Geometry::Angle { near, far, .. } => self.ends.in_ground(graph, frames, [near, far]),
+            Geometry::Distance(_) => [vector::zero(graph); 2],
+        }
     }
 
     /// g.
@@ -209,9 +281,9 @@ impl Row {
         let [u, w] = self.directions(graph, frames);
         match self.geometry {
             Geometry::Fixed(_) | Geometry::Carried(_) => vector::dot(graph, u, moving.distance),
-            Geometry::Angle { parent, child } => {
+            Geometry::Angle { drawn, .. } => {
                 let now = vector::dot(graph, u, w);
-                let drawn = vector::dot(graph, parent, child);
+                let drawn = graph.constant(drawn);
                 graph.subtract(now, drawn)
             }
             Geometry::Distance(length) => {
@@ -248,8 +320,8 @@ impl Row {
         }
     }
 
-    /// What multiplier 1 does: force and moment on the child at its attachment (ground axes), and its opposite on the
-    /// parent.
+    /// What multiplier 1 does: force and moment on the far body at its attachment (ground axes), and its opposite on the near
+    /// one.
     fn load(&self, graph: &mut Graph, frames: &[FrameMotion]) -> (Vector, Vector) {
         let zero = vector::zero(graph);
         let [u, w] = self.directions(graph, frames);
@@ -270,16 +342,16 @@ impl Row {
         let (force, moment) = self.load(graph, frames);
         let force = vector::scale(graph, multiplier, force);
         let moment = vector::scale(graph, multiplier, moment);
-        let mut parent = self.ends.parent;
-        if let (Geometry::Carried(_), Some(link)) = (self.geometry, parent.link) {
-            // The point of the parent that the child's attachment touches.
+        let mut near = self.ends.near;
+        if let (Geometry::Carried(_), Some(link)) = (self.geometry, near.link) {
+            // The point of the near body that the far one's attachment touches.
             let distance = self.moving(graph, frames).distance;
             let arm = vector::apply_transposed(graph, frames[link].orientation, distance);
-            parent.offset = vector::add(graph, parent.offset, arm);
+            near.offset = vector::add(graph, near.offset, arm);
         }
         let reversed = (vector::negate(graph, force), vector::negate(graph, moment));
         let mut wrenches = Vec::new();
-        for (end, (force, moment)) in [(parent, reversed), (self.ends.child, (force, moment))] {
+        for (end, (force, moment)) in [(near, reversed), (self.ends.far, (force, moment))] {
             let Some(link) = end.link else { continue };
             let orientation = frames[link].orientation;
             let force = vector::apply_transposed(graph, orientation, force);
@@ -290,88 +362,19 @@ impl Row {
         wrenches
     }
 
-    /// Force or moment on the child per multiplier 1, ground axes.
+    /// Force or moment on the child per multiplier 1, at its attachment, ground axes.
     pub fn reaction(&self, graph: &mut Graph, frames: &[FrameMotion], is_moment: bool) -> Vector {
         let (force, moment) = self.load(graph, frames);
-        if is_moment { moment } else { force }
-    }
-}
-
-/// A force element on an axis of a joint that closes a loop: the coordinate follows from the bodies' positions.
-pub(super) fn at_closing_joint(
-    graph: &mut Graph,
-    study: &Study,
-    tree: &Tree,
-    frames: &[FrameMotion],
-    force: &Force,
-    (joint, axis): (usize, usize),
-) -> Result<ForceGeometry, Diagnostic> {
-    match closing_coordinate(graph, study, tree, frames, (joint, axis)) {
-        Some(geometry) => Ok(geometry),
-        None => {
-            let joint = &study.joints[joint];
-            let message = format!("force `{}` acts on joint `{}`, which closes a loop", force.name, joint.name);
-            Err(Diagnostic::error(Code::CLOSED_LOOP, message)
-                .label(force.span, "its coordinate is not known there")
-                .secondary(joint.span, "closes the loop")
-                .help("let it act between the bodies (`A -> B along z`), or declare another joint of the loop last"))
+        if !self.ends.is_swapped {
+            return if is_moment { moment } else { force };
         }
+        // The far body is the parent; the force acts at its attachment.
+        if !is_moment {
+            return vector::negate(graph, force);
+        }
+        let distance = self.moving(graph, frames).distance;
+        let by_force = vector::cross(graph, distance, force);
+        let sum = vector::add(graph, moment, by_force);
+        vector::negate(graph, sum)
     }
-}
-
-/// Coordinate, rate and effect of an axis of a closing joint; for joints with at most one shift and one turn about the same
-/// axis.
-pub(super) fn closing_coordinate(
-    graph: &mut Graph,
-    study: &Study,
-    tree: &Tree,
-    frames: &[FrameMotion],
-    (index, at): (usize, usize),
-) -> Option<ForceGeometry> {
-    let joint = &study.joints[index];
-    if !matches!(joint.kind, JointKind::Prismatic | JointKind::Revolute | JointKind::Cylindrical) {
-        return None;
-    }
-    let motion = joint.axes.get(at)?.motion;
-    let ends = Ends { parent: tree.place(graph, &joint.parent), child: tree.place(graph, &joint.child) };
-    let axis = vector::constant(graph, motion.direction());
-    let axis = vector::apply(graph, ends.parent.rotation, axis);
-    let [r_p, r_c] = [ends.parent, ends.child].map(|end| kinematics::orientation(graph, frames, end.link));
-    let row = Row {
-        joint: index,
-        holds: String::new(),
-        direction: Direction::Distance,
-        ends,
-        geometry: Geometry::Carried(axis),
-    };
-    if matches!(motion, AxisMotion::Shift(_)) {
-        let coordinate = row.position(graph, frames);
-        let rate = row.velocity(graph, frames);
-        let one = graph.constant(1.0);
-        let effect = Effect::Links(row.wrenches(graph, frames, one));
-        return Some(ForceGeometry { coordinate, rate, effect });
-    }
-    let [across, beyond] = vector::perpendicular(motion.direction()).map(|v| {
-        let v = vector::constant(graph, v);
-        vector::apply(graph, ends.parent.rotation, v)
-    });
-    let turned = vector::apply(graph, r_c, across);
-    let [x, y] = [across, beyond].map(|v| {
-        let v = vector::apply(graph, r_p, v);
-        vector::dot(graph, v, turned)
-    });
-    let coordinate = graph.binary(Binary::Atan2, y, x);
-    let in_ground = vector::apply(graph, r_p, axis);
-    let [slow, fast] = row.moving(graph, frames).turning;
-    let relative = vector::subtract(graph, fast, slow);
-    let rate = vector::dot(graph, in_ground, relative);
-    let mut wrenches = Vec::new();
-    for (end, sign) in [(ends.parent, -1.0), (ends.child, 1.0)] {
-        let Some(link) = end.link else { continue };
-        let sign = graph.constant(sign);
-        let moment = vector::scale(graph, sign, in_ground);
-        let moment = vector::apply_transposed(graph, frames[link].orientation, moment);
-        wrenches.push((link, Wrench { moment, force: vector::zero(graph) }));
-    }
-    Some(ForceGeometry { coordinate, rate, effect: Effect::Links(wrenches) })
 }

@@ -6,18 +6,20 @@
 //! A joint is a list of motion axes; every axis is one link of the spanning tree (`topology`). Motion goes outwards
 //! (`kinematics`), forces come from the elements (`forces`), accelerations from the articulated-body algorithm
 //! (`articulated`), all on symbolic scalars, so that whatever is structurally zero vanishes. Joints that close loops are rows of
-//! constraints (`loops`), of which those count that are independent near the start (`assembly`), with two multipliers each
+//! constraints (`loops`), of which those count that are independent near the start (`assembly`, in numbers `linkage`), with two multipliers each
 //! (`multipliers`); what joints transmit follows from the same pass (`reactions`).
 
 mod articulated;
 mod assemble;
 mod assembly;
+mod closing;
 mod derive;
 mod emit;
 mod emit_latex;
 mod forces;
 mod inertia;
 mod kinematics;
+mod linkage;
 mod loops;
 mod multipliers;
 mod reactions;

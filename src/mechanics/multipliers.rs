@@ -1,7 +1,7 @@
 //! Multipliers of closed loops, on velocity and on position level (Gear-Gupta-Leimkuhler-1985).
 
 use super::articulated::Wrench;
-use super::assembly::assemble_loops;
+use super::assembly::{Constraints, assemble_loops};
 use super::kinematics::{self, FrameMotion};
 use super::loops::{self, Direction, Row};
 use super::scale::typical_magnitude;
@@ -11,6 +11,7 @@ use crate::diagnostics::Diagnostic;
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::Dimension;
 use crate::study::{ReactionQuantity, Study};
+use std::collections::HashMap;
 
 /// Constraints of closed loops with their multipliers.
 pub(super) struct Loops {
@@ -20,6 +21,8 @@ pub(super) struct Loops {
     projections: Vec<Symbol>,
     positions: Vec<Node>,
     velocities: Vec<Node>,
+    /// Per start of the study, where the loops are closed.
+    pub closed: Vec<HashMap<Symbol, f64>>,
     pub warnings: Vec<Diagnostic>,
 }
 
@@ -33,7 +36,10 @@ impl Loops {
         let rows = loops::rows(graph, study, tree)?;
         let positions: Vec<Node> = rows.iter().map(|row| row.position(graph, frames)).collect();
         let velocities: Vec<Node> = rows.iter().map(|row| row.velocity(graph, frames)).collect();
-        let assembly = assemble_loops(graph, study, tree, &rows, (&positions, &velocities))?;
+        let upright = loops::upright(graph, study, tree, frames);
+        let constraints =
+            Constraints { rows: &rows, positions: &positions, velocities: &velocities, upright: &upright };
+        let assembly = assemble_loops(graph, study, tree, &constraints)?;
         let rows: Vec<Row> = assembly.kept.iter().map(|&i| rows[i].clone()).collect();
         let mut symbols = |word: &str| -> Vec<Symbol> {
             rows.iter()
@@ -46,6 +52,7 @@ impl Loops {
             positions: assembly.kept.iter().map(|&i| positions[i]).collect(),
             velocities: assembly.kept.iter().map(|&i| velocities[i]).collect(),
             rows,
+            closed: assembly.positions,
             warnings: assembly.warnings,
         })
     }

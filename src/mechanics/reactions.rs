@@ -71,18 +71,23 @@ fn closing_reaction(
         sum = vector::add(graph, sum, share);
     }
     // Elements on the joint's own axes belong to what it transmits.
-    let child = study.joints[reaction.joint].child.body;
+    let ends = [study.joints[reaction.joint].parent.body, study.joints[reaction.joint].child.body];
     for ((force, geometry), &load) in study.forces.iter().zip(geometries).zip(loads) {
         let ForcePlace::Joint { joint, axis } = force.place else { continue };
         let (Effect::Links(wrenches), true) = (&geometry.effect, joint == reaction.joint) else { continue };
         let is_turn = matches!(study.joints[joint].axes[axis].motion, AxisMotion::Turn(_));
-        if is_turn != reaction.is_moment || child.is_none() {
+        if is_turn != reaction.is_moment {
             continue;
         }
-        if let Some((link, wrench)) = wrenches.last() {
+        // On the child; where that is ground, the opposite of what acts on the parent.
+        let (own, factor) = match ends {
+            [_, Some(_)] => (wrenches.last(), load),
+            _ => (wrenches.first(), graph.negate(load)),
+        };
+        if let Some((link, wrench)) = own {
             let local = if reaction.is_moment { wrench.moment } else { wrench.force };
             let turned = vector::apply(graph, frames[*link].orientation, local);
-            let share = vector::scale(graph, load, turned);
+            let share = vector::scale(graph, factor, turned);
             sum = vector::add(graph, sum, share);
         }
     }

@@ -48,7 +48,8 @@ pub struct Variable {
     pub dimension: Dimension,
     /// Typical magnitude, SI; the integrator's absolute tolerance refers to it.
     pub scale: f64,
-    /// Value in the reference configuration: zero, but for the first component of quaternions.
+    /// Value in the reference configuration: zero, but for the first component of quaternions; with closed loops, in a position
+    /// near it (near the first start of the study) that closes them.
     pub reference: f64,
 }
 

@@ -194,15 +194,22 @@ pub(super) fn start(
     }
     if bound.differential().contains(&false) {
         let stated = stated(compiled, record.experiment);
-        return match integrate::consistent_start(bound, t0, &y, &sensitivity, &stated) {
-            // More positions of a loop are stated than it has freedoms: they say where it stands, not to the last digit.
-            Err(failure) if failure.cause == FailureCause::InconsistentStart => {
-                let laws: Vec<bool> =
-                    compiled.model.variables().iter().map(|variable| variable.kind == VariableKind::Law).collect();
-                integrate::consistent_start(bound, t0, &y, &sensitivity, &laws).map_err(|_| failure)
+        let first = integrate::consistent_start(bound, t0, &y, &sensitivity, &stated);
+        let Err(failure) = first else { return first };
+        if failure.cause != FailureCause::InconsistentStart {
+            return Err(failure);
+        }
+        // More positions of a loop are stated than it has freedoms: they say where it stands, not to the last digit. Then the
+        // same of velocities.
+        for given_up in [&[VariableKind::Position][..], &[VariableKind::Position, VariableKind::Velocity]] {
+            let kinds = compiled.model.variables().iter().map(|variable| variable.kind);
+            let kept: Vec<bool> =
+                kinds.zip(&stated).map(|(kind, is_stated)| *is_stated && !given_up.contains(&kind)).collect();
+            if let Ok(start) = integrate::consistent_start(bound, t0, &y, &sensitivity, &kept) {
+                return Ok(start);
             }
-            other => other,
-        };
+        }
+        return Err(failure);
     }
     let mut y_prime = vec![0.0; y.len()];
     bound.explicit_rates(t0, &y, &mut y_prime);
@@ -225,7 +232,8 @@ const VISIBLE_MOVE: f64 = 1e-6;
 /// Variables whose start values are stated: by the experiment, or by a law for its states. Those of the reference
 /// configuration at rest are where the mechanism starts from to close its loops.
 fn stated(compiled: &Compiled, experiment: usize) -> Vec<bool> {
-    let overrides = compiled.study.experiments.get(experiment).map_or(&[][..], |e| &e.start.overrides[..]);
+    let start = compiled.study.starts().nth(experiment);
+    let overrides = start.as_ref().map_or(&[][..], |(_, start, _)| &start.overrides[..]);
     let is_stated = |variable: &Variable| {
         variable.kind == VariableKind::Law || overrides.iter().any(|(symbol, _)| *symbol == variable.symbol)
     };

@@ -33,6 +33,13 @@ impl JointFreedom {
         self.rotation.is_some() || self.axes.iter().any(|axis| matches!(axis.motion, AxisMotion::Turn(_)))
     }
 
+    /// Such a joint cannot be written as constraints on directions of its two bodies.
+    pub fn shifts_around_a_turn(&self) -> bool {
+        let is_turn: Vec<bool> = self.axes.iter().map(|axis| matches!(axis.motion, AxisMotion::Turn(_))).collect();
+        let is_sorted_back = is_turn.iter().rev().is_sorted();
+        !is_turn.is_sorted() && !is_sorted_back
+    }
+
     pub fn degrees_of_freedom(&self) -> usize {
         self.axes.len() + if self.rotation.is_some() { 3 } else { 0 }
     }

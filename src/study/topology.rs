@@ -180,8 +180,9 @@ impl<'a> Checker<'a> {
         Some(End { body, point })
     }
 
-    /// Joints with prescribed motion come first, then those that carry elements, then free ones, then those with the least freedom, so that loops are closed where the fewest
-    /// constraints arise; among equals the ones declared first.
+    /// Joints with prescribed motion come first, then those that have no form as constraints, then those that carry elements,
+    /// then free ones, then those with the least freedom, so that loops are closed where the fewest constraints arise; among
+    /// equals the ones declared first.
     fn choose_tree(&mut self) {
         let ground = self.declared.bodies.len();
         let node = |end: End| end.body.unwrap_or(ground);
@@ -201,7 +202,8 @@ impl<'a> Checker<'a> {
                 let is_driven = find(self.declared.joints[*joint].fields, "motion").is_some();
                 // A free joint holds nothing: it is there to give its body coordinates.
                 let is_free = read.freedom.kind == JointKind::Free;
-                (!is_driven, !carries_elements(read), !is_free, read.freedom.degrees_of_freedom())
+                let order = (!is_free, read.freedom.degrees_of_freedom());
+                (!is_driven, !read.freedom.shifts_around_a_turn(), !carries_elements(read), order)
             })
         });
         let mut closes_loop: Vec<bool> = self.topology.joints.iter().map(Option::is_some).collect();

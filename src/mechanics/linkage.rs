@@ -1,0 +1,270 @@
+//! Closed loops as numbers: where a mechanism can stand.
+
+use super::assembly::Constraints;
+use super::topology::{Axis, Coordinate, Tree};
+use crate::expression::{Graph, Node, Symbol};
+use crate::linear::SingularValueDecomposition;
+use crate::study::{Start, Study};
+use std::collections::HashMap;
+
+/// Loops count as closed below this error (m, rad).
+const CLOSED: f64 = 1e-9;
+/// A step below this leads nowhere.
+const SMALLEST_STEP: f64 = 1e-14;
+const LARGEST_STEP: f64 = 0.3;
+const MOST_STEPS: usize = 100;
+/// Steps without a smaller error than the best before them: a dead end.
+const PATIENCE: usize = 25;
+/// How far the configuration judged is from the start (m and rad): symmetric positions have constraints that depend on each
+/// other only there.
+const ASIDE: f64 = 0.03;
+/// Other positions tried where the start leads nowhere, and how far away they are (rad; m relative to the largest error).
+const ATTEMPTS: usize = 40;
+const FAR: f64 = 3.0;
+
+/// The constraints as functions of the coordinates.
+pub(super) struct Linkage {
+    graph: Graph,
+    positions: Vec<Node>,
+    velocities: Vec<Node>,
+    upright: Vec<Node>,
+    freedoms: Vec<Freedom>,
+    /// Parameters at their start, coordinates where the mechanism stands.
+    values: HashMap<Symbol, f64>,
+}
+
+/// A rate that is free, and what it changes.
+struct Freedom {
+    rate: Symbol,
+    change: Change,
+    is_turn: bool,
+}
+
+#[derive(Clone, Copy)]
+enum Change {
+    Coordinate(Symbol),
+    Quaternion([Symbol; 4], usize),
+}
+
+impl Change {
+    fn touches(self, given: &HashMap<Symbol, f64>) -> bool {
+        match self {
+            Change::Coordinate(symbol) => given.contains_key(&symbol),
+            Change::Quaternion(symbols, _) => symbols.iter().any(|symbol| given.contains_key(symbol)),
+        }
+    }
+}
+
+impl Linkage {
+    pub fn new(graph: &Graph, study: &Study, tree: &Tree, constraints: &Constraints) -> Self {
+        let Constraints { positions, velocities, upright, .. } = constraints;
+        let (small, nodes) = graph.extract(&[*positions, *velocities, *upright].concat());
+        let (positions, rest) = nodes.split_at(positions.len());
+        let (velocities, upright) = rest.split_at(velocities.len());
+        let mut values: HashMap<Symbol, f64> = study.parameters.iter().map(|p| (p.symbol, p.start)).collect();
+        let mut freedoms = Vec::new();
+        for link in &tree.links {
+            let is_turn = matches!(link.axis, Axis::Turn(_));
+            match link.coordinate {
+                Coordinate::Free { symbols, .. } => {
+                    let change = Change::Coordinate(symbols.position);
+                    freedoms.push(Freedom { rate: symbols.velocity, change, is_turn });
+                    values.insert(symbols.position, 0.0);
+                }
+                Coordinate::Rotation { symbols, component } => {
+                    let change = Change::Quaternion(symbols.quaternion, component);
+                    freedoms.push(Freedom { rate: symbols.velocity[component], change, is_turn });
+                    symbols.quaternion.iter().enumerate().for_each(|(i, &s)| {
+                        values.insert(s, f64::from(u8::from(i == 0)));
+                    });
+                }
+                Coordinate::Prescribed { .. } | Coordinate::Weld => {}
+            }
+        }
+        let (positions, velocities, upright) = (positions.to_vec(), velocities.to_vec(), upright.to_vec());
+        Self { graph: small, positions, velocities, upright, freedoms, values }
+    }
+
+    pub fn freedom(&self) -> usize {
+        self.freedoms.len()
+    }
+
+    /// The positions that a start states, as far as numbers and parameters go.
+    pub fn given(&self, study: &Study, start: &Start) -> HashMap<Symbol, f64> {
+        let mut given = HashMap::new();
+        for &(symbol, node) in &start.overrides {
+            let known = |s: Symbol| self.values.get(&s).copied().unwrap_or(0.0);
+            let value = study.graph.evaluate(&[node], known, |_, _, _| 0.0)[0];
+            let is_position =
+                self.freedoms.iter().any(|freedom| freedom.change.touches(&HashMap::from([(symbol, 0.0)])));
+            if is_position && value.is_finite() {
+                given.insert(symbol, value);
+            }
+        }
+        given
+    }
+
+    /// Positions at which the loops are closed: near those given, which stay where that is possible; else from elsewhere.
+    /// The residual near the start otherwise.
+    pub fn assembled(&mut self, given: &HashMap<Symbol, f64>) -> Result<HashMap<Symbol, f64>, Vec<f64>> {
+        let drawn = self.values.clone();
+        self.values.extend(given);
+        self.normalise();
+        let start = self.values.clone();
+        let unstated: Vec<usize> =
+            (0..self.freedoms.len()).filter(|&i| !self.freedoms[i].change.touches(given)).collect();
+        let all: Vec<usize> = (0..self.freedoms.len()).collect();
+        let mut outcome = self.close(&unstated);
+        if outcome.is_err() {
+            self.values = start.clone();
+            outcome = self.close(&all);
+        }
+        for attempt in 0..ATTEMPTS {
+            let Err(residual) = &outcome else { break };
+            let reach = residual.iter().fold(0.0_f64, |m, v| m.max(v.abs())).clamp(0.1, 10.0);
+            self.values = start.clone();
+            self.move_far(&unstated, attempt, reach);
+            let again = self.close(&unstated).or_else(|_| self.close(&all));
+            outcome = again.map_err(|_| residual.clone());
+        }
+        let closed = std::mem::replace(&mut self.values, drawn);
+        outcome.map(|()| closed)
+    }
+
+    /// The Jacobian of the constraints at a closed position that is not special: m x n, column-major.
+    pub fn general_jacobian(&mut self, closed: &HashMap<Symbol, f64>) -> Vec<f64> {
+        let drawn = std::mem::replace(&mut self.values, closed.clone());
+        self.move_aside();
+        let all: Vec<usize> = (0..self.freedoms.len()).collect();
+        if self.close(&all).is_err() {
+            self.values = closed.clone();
+        }
+        let jacobian = self.jacobian();
+        self.values = drawn;
+        jacobian
+    }
+
+    fn evaluate(&self, nodes: &[Node]) -> Vec<f64> {
+        self.graph.evaluate(nodes, |s| self.values.get(&s).copied().unwrap_or(0.0), |_, _, _| 0.0)
+    }
+
+    /// dg/dt per rate: m x n, column-major.
+    fn jacobian(&self) -> Vec<f64> {
+        let at = |moving: Option<Symbol>| {
+            let value = |s: Symbol| if Some(s) == moving { 1.0 } else { self.values.get(&s).copied().unwrap_or(0.0) };
+            self.graph.evaluate(&self.velocities, value, |_, _, _| 0.0)
+        };
+        let resting = at(None);
+        let column = |rate: Symbol| at(Some(rate)).into_iter().zip(&resting).map(|(v, r)| v - r).collect::<Vec<_>>();
+        self.freedoms.iter().flat_map(|freedom| column(freedom.rate)).collect()
+    }
+
+    fn advance(&mut self, moved: &[usize], step: &[f64]) {
+        for (&which, &amount) in moved.iter().zip(step) {
+            match self.freedoms[which].change {
+                Change::Coordinate(symbol) => *self.values.entry(symbol).or_insert(0.0) += amount,
+                Change::Quaternion(symbols, component) => {
+                    let q = symbols.map(|s| self.values.get(&s).copied().unwrap_or(0.0));
+                    let (cosine, sine) = ((0.5 * amount).cos(), (0.5 * amount).sin());
+                    let [w, x, y, z] = q;
+                    // q (cosine, sine e_component)
+                    let change = match component {
+                        0 => [-x, w, z, -y],
+                        1 => [-y, -z, w, x],
+                        _ => [-z, y, -x, w],
+                    };
+                    let turned = (0..4).map(|i| cosine * q[i] + sine * change[i]);
+                    symbols.iter().zip(turned).for_each(|(&s, v)| {
+                        self.values.insert(s, v);
+                    });
+                }
+            }
+        }
+        self.normalise();
+    }
+
+    /// Quaternions of length one.
+    fn normalise(&mut self) {
+        for freedom in &self.freedoms {
+            let Change::Quaternion(symbols, 0) = freedom.change else { continue };
+            let q = symbols.map(|s| self.values.get(&s).copied().unwrap_or(0.0));
+            let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let q = if norm > 0.0 { q.map(|v| v / norm) } else { [1.0, 0.0, 0.0, 0.0] };
+            symbols.iter().zip(q).for_each(|(&s, v)| {
+                self.values.insert(s, v);
+            });
+        }
+    }
+
+    /// A fixed pattern of small motions, different for every coordinate.
+    fn move_aside(&mut self) {
+        let all: Vec<usize> = (0..self.freedoms.len()).collect();
+        let step: Vec<f64> = all.iter().map(|&i| ASIDE * (1.0 + (i as f64 * 2.4).sin()) / 2.0).collect();
+        self.advance(&all, &step);
+    }
+
+    /// A fixed sequence of large motions, growing with the attempts; `reach` is typical of the lengths.
+    fn move_far(&mut self, moved: &[usize], attempt: usize, reach: f64) {
+        let share = FAR * (attempt + 1) as f64 / ATTEMPTS as f64;
+        let amount = |i: usize| {
+            // Multiples of irrational numbers fill the interval evenly.
+            let place = ((attempt + 1) as f64 * 0.618_033_988_75
+                + (i + 1) as f64 * 0.414_213_562_37 * (attempt + 1) as f64)
+                .fract();
+            let size = if self.freedoms[i].is_turn { 1.0 } else { reach };
+            share * size * (2.0 * place - 1.0)
+        };
+        let step: Vec<f64> = moved.iter().map(|&i| amount(i)).collect();
+        self.advance(moved, &step);
+    }
+
+    /// Newton's method with the shortest steps (Gauss-Newton) of the coordinates `moved`. The residual where it got stuck, or
+    /// ends in a joint that is turned over.
+    fn close(&mut self, moved: &[usize]) -> Result<(), Vec<f64>> {
+        let largest = |values: &[f64]| {
+            values.iter().fold(0.0_f64, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(v.abs()) })
+        };
+        let mut residual = self.evaluate(&self.positions);
+        let (mut best, mut since) = (f64::INFINITY, 0);
+        for _ in 0..MOST_STEPS {
+            let error = largest(&residual);
+            if error < CLOSED {
+                break;
+            }
+            since = if error < 0.9 * best { 0 } else { since + 1 };
+            best = best.min(error);
+            if since > PATIENCE {
+                break;
+            }
+            let Some(mut step) = self.shortest_step(&residual, moved) else { break };
+            let size = largest(&step);
+            if size > LARGEST_STEP {
+                step.iter_mut().for_each(|s| *s *= LARGEST_STEP / size);
+            }
+            if size < SMALLEST_STEP {
+                break;
+            }
+            self.advance(moved, &step);
+            residual = self.evaluate(&self.positions);
+        }
+        let is_upright = || self.evaluate(&self.upright).iter().all(|cosine| *cosine > 0.0);
+        if largest(&residual) < CLOSED && is_upright() { Ok(()) } else { Err(residual) }
+    }
+
+    fn shortest_step(&self, residual: &[f64], moved: &[usize]) -> Option<Vec<f64>> {
+        let (m, n) = (residual.len(), moved.len());
+        let all = self.jacobian();
+        let jacobian: Vec<f64> = moved.iter().flat_map(|&i| &all[i * m..(i + 1) * m]).copied().collect();
+        if jacobian.is_empty() {
+            return None;
+        }
+        let svd = SingularValueDecomposition::new(m, n, &jacobian).ok()?;
+        let mut step = vec![0.0; n];
+        for j in 0..svd.rank(1e-9) {
+            let along: f64 = svd.left(j).iter().zip(residual).map(|(u, r)| u * r).sum();
+            let factor = -along / svd.singular_values[j];
+            step.iter_mut().zip(svd.right(j)).for_each(|(s, v)| *s += factor * v);
+        }
+        step.iter().all(|s| s.is_finite()).then_some(step)
+    }
+}
