@@ -1,7 +1,8 @@
 //! The cost over the work of several optimisers (the document's Figs. 3.4 and 3.5).
 
+use crate::diagnostics::Diagnostic;
 use crate::fit::{Bounds, Control, LeastSquares, Optimiser, Options, Search, levenberg_marquardt, search};
-use crate::identify::{Problem, Settings, Weighting, fit, prefilters};
+use crate::identify::{Fitted, Problem, Settings, Weighting, fit, prefilters};
 use crate::simulation::{Compiled, Record};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -12,6 +13,8 @@ pub struct Courses {
     pub study: String,
     pub variant: String,
     pub parameters: Vec<String>,
+    /// Parameters held at their estimates.
+    pub held: Vec<String>,
     /// Allowed work in simulations of all records; a gradient by internal differentiation counts as one per parameter more.
     pub budget: usize,
     pub courses: Vec<Course>,
@@ -33,17 +36,38 @@ pub struct Course {
 const REACHED: f64 = 0.01;
 
 /// Runs every optimiser from the study's start, with the weights of a first fit's end so that all minimise the same cost.
+/// `chosen`: names of the parameters to search (empty: all); the others keep the values of that fit.
 ///
 /// # Errors
 /// The study cannot be fitted at all.
 pub fn courses(
     compiled: &Compiled,
     records: &[&Record],
+    chosen: &[String],
     budget: usize,
     seed: u64,
-) -> Result<Courses, crate::diagnostics::Diagnostic> {
+) -> Result<Courses, Vec<Diagnostic>> {
+    let fitted = fit(compiled, records, &Settings::default(), &mut |_| Control::Continue).map_err(|one| vec![one])?;
+    let parameters = &compiled.study.parameters;
+    let held: Vec<(String, f64)> = parameters
+        .iter()
+        .zip(&fitted.theta)
+        .filter(|(parameter, _)| !chosen.is_empty() && !chosen.contains(&parameter.name))
+        .map(|(parameter, value)| (parameter.name.clone(), *value))
+        .collect();
+    let reduced = if held.is_empty() { compiled.clone() } else { Compiled::frozen(compiled.study.clone(), &held)? };
+    let held = held.into_iter().map(|(name, _)| name).collect();
+    side_by_side(&reduced, records, &fitted, held, (budget, seed)).map_err(|one| vec![one])
+}
+
+fn side_by_side(
+    compiled: &Compiled,
+    records: &[&Record],
+    fitted: &Fitted,
+    held: Vec<String>,
+    (budget, seed): (usize, u64),
+) -> Result<Courses, Diagnostic> {
     let study = &compiled.study;
-    let fitted = fit(compiled, records, &Settings::default(), &mut |_| Control::Continue)?;
     let start: Vec<f64> = study.parameters.iter().map(|parameter| parameter.start).collect();
     let bounds = Bounds::new(
         study.parameters.iter().map(|parameter| parameter.lower).collect(),
@@ -63,6 +87,7 @@ pub fn courses(
         study: study.name.clone(),
         variant: study.variant.clone(),
         parameters: study.parameters.iter().map(|parameter| parameter.name.clone()).collect(),
+        held,
         budget,
         courses: found.into_iter().map(|(optimiser, course)| finished(optimiser, course, best)).collect(),
     })
@@ -83,7 +108,7 @@ fn problem<'a>(
     compiled: &'a Compiled,
     records: &[&'a Record],
     weighting: &Weighting,
-) -> Result<Problem<'a>, crate::diagnostics::Diagnostic> {
+) -> Result<Problem<'a>, Diagnostic> {
     let filters = prefilters(compiled, records)?;
     Ok(Problem::new(compiled, records.to_vec(), filters, weighting.weights.clone()))
 }

@@ -31,6 +31,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
         .map(|fit| identification(&fit.compiled, &fit.fitted, &fit.records.iter().collect::<Vec<_>>()))
         .collect();
     for (result, structure) in results.iter_mut().zip(structures(&candidates)) {
+        // One figure under that name: with the counts that all variants share.
+        result.bic = structure.bic;
         result.structure = Some(structure);
     }
     match study.format {

@@ -3,11 +3,12 @@
 use super::output::write_whole;
 use super::session::Session;
 use super::{Failed, Format, StudyArguments};
-use crate::fit::Control;
-use crate::identify::{Fitted, Settings, fit, identification};
+use crate::fit::{Chosen, Control, Optimiser};
+use crate::identify::{Fitted, Settings, equation_error, fit, identification};
 use crate::report;
 use crate::simulation::{Compiled, Record};
-use crate::study::Role;
+use crate::study::{ErrorDefinition, Role};
+use clap::ValueEnum;
 use std::path::PathBuf;
 
 #[derive(clap::Args, Debug)]
@@ -36,6 +37,92 @@ pub(super) struct SearchArguments {
     /// Keep the best parameters so far in this file, and go on from it where it exists
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
+    /// What searches the minimum
+    #[arg(long, value_enum, default_value_t)]
+    optimiser: OptimiserArgument,
+    /// Simulations of all records that an optimiser other than Levenberg-Marquardt may take
+    #[arg(long, value_name = "N", default_value_t = 2000)]
+    budget: usize,
+    /// What counts as error between model and measurement (default: as the study's `solver` says)
+    #[arg(long, value_enum)]
+    error: Option<ErrorArgument>,
+    /// Stretches per record of `--error shooting`
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    stretches: usize,
+    /// Where the search starts
+    #[arg(long, value_enum, default_value_t)]
+    start: StartArgument,
+    /// Noise of the measurements: weight by an autoregressive model of its colour, or not (default: as the study's `solver` says)
+    #[arg(long, value_enum)]
+    noise: Option<NoiseArgument>,
+    /// Widen the band of the filter to that of the study in so many steps, each twice as wide
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    bands: usize,
+    /// End after so many iterations, with the best so far
+    #[arg(long, value_name = "N")]
+    steps: Option<usize>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ErrorArgument {
+    /// Free simulation from the experiment's start
+    Output,
+    /// Measured states in the equations of motion: one linear step
+    Equation,
+    /// One-step predictions by an extended Kalman filter: noise in the process, too
+    Filter,
+    /// Stretches that the fit joins: weakly damped, self-excited, chaotic
+    Shooting,
+}
+
+impl From<ErrorArgument> for ErrorDefinition {
+    fn from(argument: ErrorArgument) -> Self {
+        match argument {
+            ErrorArgument::Output => Self::Output,
+            ErrorArgument::Equation => Self::Equation,
+            ErrorArgument::Filter => Self::Filter,
+            ErrorArgument::Shooting => Self::Shooting,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
+enum StartArgument {
+    /// The study's start values
+    #[default]
+    Study,
+    /// The estimate by equation error
+    Equation,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum NoiseArgument {
+    White,
+    Coloured,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum OptimiserArgument {
+    /// Gauss-Newton steps within a trust region; knows constraints
+    #[default]
+    LevenbergMarquardt,
+    /// Sequential quadratic programming with the gradient alone
+    Sequential,
+    /// The simplex of Nelder and Mead, without derivatives
+    Simplex,
+    /// Differential evolution: global, without derivatives
+    Evolution,
+}
+
+impl From<OptimiserArgument> for Optimiser {
+    fn from(argument: OptimiserArgument) -> Self {
+        match argument {
+            OptimiserArgument::LevenbergMarquardt => Self::LevenbergMarquardt,
+            OptimiserArgument::Sequential => Self::Sequential,
+            OptimiserArgument::Simplex => Self::Simplex,
+            OptimiserArgument::Evolution => Self::Evolution,
+        }
+    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
@@ -72,12 +159,22 @@ pub(super) struct FittedVariant {
 impl SearchArguments {
     /// A single search from the study's start.
     pub(super) fn one() -> Self {
-        Self { starts: 1, ..Self::default() }
+        Self { starts: 1, stretches: 12, budget: Chosen::default().budget, ..Self::default() }
     }
 
     fn settings(&self, compiled: &Compiled) -> Result<Settings, Failed> {
         let parameters = &compiled.study.parameters;
-        let mut settings = Settings { further_starts: self.starts.saturating_sub(1), seed: 1, ..Settings::default() };
+        let mut settings = Settings {
+            further_starts: self.starts.saturating_sub(1),
+            seed: 1,
+            maximum_iterations: self.steps,
+            error: self.error.map_or(compiled.study.solver.error, ErrorDefinition::from),
+            stretches: self.stretches,
+            coloured_noise: self.noise.map_or(compiled.study.solver.coloured_noise, |n| n == NoiseArgument::Coloured),
+            bands: self.bands,
+            chosen: Chosen { optimiser: self.optimiser.into(), budget: self.budget, ..Chosen::default() },
+            ..Settings::default()
+        };
         for path in &self.with {
             settings.knowledge.extend(super::results::read(path, parameters)?);
         }
@@ -98,7 +195,12 @@ pub(super) fn fit_variant(
     let records = session.records(&compiled.study, study)?;
     let estimation: Vec<&Record> = records.iter().filter(|record| record.role == Role::Estimation).collect();
     let quiet = study.quiet;
-    let settings = search.settings(&compiled)?;
+    let mut settings = search.settings(&compiled)?;
+    if search.start == StartArgument::Equation && settings.start.is_none() {
+        let start: Vec<f64> = compiled.study.parameters.iter().map(|parameter| parameter.start).collect();
+        let found = equation_error(&compiled, &estimation, &start).map_err(|diagnostic| session.fail(&[diagnostic]))?;
+        settings.start = Some(found.theta);
+    }
     let mut keeper = super::results::Keeper::new(search.resume.as_deref(), &compiled);
     let fitted = fit(&compiled, &estimation, &settings, &mut |progress| {
         keeper.keep(progress);
@@ -109,4 +211,16 @@ pub(super) fn fit_variant(
     })
     .map_err(|diagnostic| session.fail(&[diagnostic]))?;
     Ok(FittedVariant { compiled, records, fitted })
+}
+
+/// Complains about names that are no parameters of the study.
+pub(super) fn known_parameters(compiled: &Compiled, names: &[String]) -> Result<(), Failed> {
+    let known: Vec<&str> = compiled.study.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+    match names.iter().find(|name| !known.contains(&name.as_str())) {
+        Some(name) => {
+            eprintln!("error: `{name}` is no parameter of this study ({})", known.join(", "));
+            Err(Failed)
+        }
+        None => Ok(()),
+    }
 }

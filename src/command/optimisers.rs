@@ -13,6 +13,9 @@ use std::path::PathBuf;
 pub(super) struct Arguments {
     #[command(flatten)]
     study: StudyArguments,
+    /// Search only these parameters, the others keep their estimates (default: all)
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    parameters: Vec<String>,
     /// Allowed work per optimiser, in simulations of all records
     #[arg(long, default_value_t = 400)]
     budget: usize,
@@ -31,8 +34,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     let compiled = session.compile(&study.variant)?;
     let records = session.records(&compiled.study, study)?;
     let estimation: Vec<&Record> = records.iter().filter(|record| record.role == Role::Estimation).collect();
-    let result = courses(&compiled, &estimation, arguments.budget, arguments.seed)
-        .map_err(|diagnostic| session.fail(&[diagnostic]))?;
+    super::fit::known_parameters(&compiled, &arguments.parameters)?;
+    let result = courses(&compiled, &estimation, &arguments.parameters, arguments.budget, arguments.seed)
+        .map_err(|diagnostics| session.fail(&diagnostics))?;
     if let Some(path) = &arguments.figure {
         write_whole(path, &report::figure::courses(&result))?;
     }

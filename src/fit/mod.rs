@@ -5,6 +5,7 @@
 //! *Must not happen here*: simulation, files, knowledge of bodies or names of channels.
 
 mod alternatives;
+mod chosen;
 mod constrained;
 mod cost;
 mod levenberg_marquardt;
@@ -15,6 +16,7 @@ mod problem;
 mod step;
 
 pub use alternatives::{Optimiser, Search, search};
+pub use chosen::{Chosen, minimise};
 pub use constrained::{Constraints, constrained};
 pub use cost::{ChannelCost, CostTree, magnitude_weight, noise_weight};
 pub use levenberg_marquardt::levenberg_marquardt;

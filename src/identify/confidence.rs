@@ -6,7 +6,7 @@ use super::noise;
 use crate::signal::effective_count;
 use crate::simulation::Compiled;
 use crate::statistics::{Covariance, confidence_interval, identifiability};
-use crate::study::Parameter;
+use crate::study::{ErrorDefinition, Parameter};
 
 /// Level of all intervals.
 const LEVEL: f64 = 0.95;
@@ -81,7 +81,9 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     let gradient = gradient_with_priors(fitted, &scales);
     let models = noise::models(fitted);
     confidence.noise_orders = models.iter().map(noise::NoiseModel::order).collect();
-    confidence.noise = noise::deviations(compiled, fitted, &gradient, &scales, RANK_THRESHOLD);
+    let levels = fitted.noise_levels.clone();
+    confidence.noise =
+        levels.unwrap_or_else(|| noise::deviations(compiled, fitted, &gradient, &scales, RANK_THRESHOLD));
     let inverse = Covariance::new(&gradient, &scales, 1.0, None, RANK_THRESHOLD).map(|covariance| covariance.matrix);
     let gamma = noise::gamma(fitted, &gradient, &models, &inverse.unwrap_or_else(|_| vec![0.0; count * count]));
     if let Ok(analysis) = identifiability(&gradient, &scales, &fitted.theta, &names, RANK_THRESHOLD) {
@@ -91,7 +93,10 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     }
     if let Ok(covariance) = Covariance::new(&gradient, &scales, 1.0, Some(&gamma), RANK_THRESHOLD) {
         confidence.correlation = covariance.correlation().chunks(count).map(<[f64]>::to_vec).collect();
-        confidence.standard_deviations.clone_from(&covariance.standard_deviations);
+        if fitted.error != ErrorDefinition::Equation {
+            // Noise in the regressors biases the equation error by an unknown amount.
+            confidence.standard_deviations.clone_from(&covariance.standard_deviations);
+        }
         confidence.directions = covariance.undetermined;
         confidence.covariance = covariance.matrix;
     }

@@ -1,17 +1,21 @@
 //! The fit of one compiled study to its estimation records.
 
+use super::bands::bands;
+use super::constraints::StudyConstraints;
+use super::definitions::{equation, filter, shooting_start};
+use super::errors::EquationFit;
 use super::knowledge::straightened;
 use super::problem::{Block, Problem};
 use super::weights::{Weighting, first_weights, residual_deviations};
+use super::whitening::whitened;
 use crate::diagnostics::{Code, Diagnostic};
-use crate::expression::{Graph, Node, Symbol};
 use crate::fit::{
-    Bounds, Constraints, Control, Estimate, FitError, Options, PriorRow, Progress, StopReason, WithPriors, constrained,
+    Bounds, Chosen, Control, Estimate, FitError, LeastSquares, Options, PriorRow, Progress, StopReason, WithPriors,
     parallel_starts,
 };
 use crate::signal::Prefilter;
 use crate::simulation::{Compiled, Record};
-use crate::study::{Parameter, Study};
+use crate::study::{ErrorDefinition, Parameter, Study};
 use rayon::prelude::*;
 
 /// How often weights are taken from the residual and the fit repeated (method 3.20, IV.6).
@@ -30,8 +34,18 @@ pub struct Settings {
     /// Further searches from points all over the bounds, the best of all counts; and their seed.
     pub further_starts: usize,
     pub seed: u64,
+    /// What searches the minimum.
+    pub chosen: Chosen,
     /// What independent results know about the parameters.
     pub knowledge: Vec<PriorRow>,
+    /// What counts as error.
+    pub error: ErrorDefinition,
+    /// Stretches per record of [`ErrorDefinition::Shooting`]; a number is found where it is 0.
+    pub stretches: usize,
+    /// Coloured noise is modelled and the cost weighted by it.
+    pub coloured_noise: bool,
+    /// Steps in which the band of the prefilter is widened to that of the study (method 3).
+    pub bands: usize,
 }
 
 /// A converged (or stopped) fit with what statistics need of it.
@@ -59,6 +73,19 @@ pub struct Fitted {
     pub iterations: usize,
     pub simulations: usize,
     pub failed_simulations: usize,
+    pub error: ErrorDefinition,
+    /// Of [`ErrorDefinition::Equation`].
+    pub equation: Option<EquationFit>,
+    /// Largest gap between stretches, relative to a state's course, before the output error took over.
+    pub gap: Option<f64>,
+    /// Process noise that the filter error found: (state, root of the spectral density of its rate, SI).
+    pub process_noise: Vec<(String, f64)>,
+    /// Noise levels per measure (SI) where the fit found them itself: filter error, pre-whitening.
+    pub noise_levels: Option<Vec<Option<f64>>>,
+    /// Order of the noise model by which each block was weighted; empty where none was.
+    pub whitening_orders: Vec<usize>,
+    /// Bands that were fitted before the study's own: (stop edge in Hz, discrepancy in %).
+    pub bands: Vec<(f64, f64)>,
 }
 
 impl Fitted {
@@ -84,8 +111,32 @@ pub fn prefilters(compiled: &Compiled, records: &[&Record]) -> Result<Vec<Prefil
 /// Fits the study's parameters to `records`.
 ///
 /// # Errors
-/// The model cannot be simulated at the start values, or they lie outside their bounds.
+/// The model cannot be simulated at the start values, or they lie outside their bounds; the definition of the error does not fit the
+/// study.
 pub fn fit(
+    compiled: &Compiled,
+    records: &[&Record],
+    settings: &Settings,
+    observer: &mut dyn FnMut(&Progress) -> Control,
+) -> Result<Fitted, Diagnostic> {
+    match settings.error {
+        ErrorDefinition::Output => output(compiled, records, settings, observer),
+        ErrorDefinition::Equation => equation(compiled, records, settings),
+        ErrorDefinition::Filter => filter(compiled, records, settings, observer),
+        ErrorDefinition::Shooting => {
+            let joined = shooting_start(compiled, records, settings, observer)?;
+            let settings = Settings { start: Some(joined.theta), ..settings.clone() };
+            let mut fitted = output(compiled, records, &settings, observer)?;
+            (fitted.error, fitted.gap) = (ErrorDefinition::Shooting, Some(joined.gap));
+            fitted.simulations += joined.simulations;
+            fitted.failed_simulations += joined.failures;
+            Ok(fitted)
+        }
+    }
+}
+
+/// Output error: free simulations.
+fn output(
     compiled: &Compiled,
     records: &[&Record],
     settings: &Settings,
@@ -99,6 +150,7 @@ pub fn fit(
     let rounds = if settings.weights.is_some() { 0 } else { REWEIGHTINGS };
     let gains: Vec<f64> = filters.iter().map(Prefilter::noise_gain).collect();
     let mut start = settings.start.clone().unwrap_or_else(|| start_values(compiled));
+    let before = bands(compiled, records, settings, &mut start, observer)?;
     let mut problem = Problem::new(compiled, records.to_vec(), filters, weighting.weights.clone());
     let mut rows = prior_rows(&compiled.study);
     if !settings.knowledge.is_empty() {
@@ -134,7 +186,10 @@ pub fn fit(
         let settled = next.largest_change(&weighting) < WEIGHT_CHANGE;
         if round == rounds || settled || estimate.stop_reason == StopReason::Interrupted {
             let mut fitted = finish(estimate, weighting, &problem, history, iterations);
-            (fitted.prior_rows, fitted.start_costs) = (rows, start_costs);
+            (fitted.prior_rows, fitted.start_costs, fitted.bands) = (rows, start_costs, before);
+            if settings.coloured_noise && fitted.stop_reason != StopReason::Interrupted {
+                return whitened(compiled, problem, fitted, settings, observer);
+            }
             return Ok(fitted);
         }
         weighting = next;
@@ -142,60 +197,16 @@ pub fn fit(
     Err(Diagnostic::error(Code::FIT_FAILED, "the fit ended without a result"))
 }
 
-fn start_values(compiled: &Compiled) -> Vec<f64> {
+pub(super) fn start_values(compiled: &Compiled) -> Vec<f64> {
     compiled.study.parameters.iter().map(|parameter| parameter.start).collect()
 }
 
 /// Priors of the study.
-fn prior_rows(study: &Study) -> Vec<PriorRow> {
+pub(super) fn prior_rows(study: &Study) -> Vec<PriorRow> {
     let parameters = study.parameters.iter().enumerate();
     let own = parameters
         .filter_map(|(index, p)| p.prior.map(|prior| PriorRow::gaussian(index, prior.mean, prior.standard_deviation)));
     own.collect()
-}
-
-/// The study's constraints as functions of the parameters.
-struct StudyConstraints {
-    graph: Graph,
-    symbols: Vec<Symbol>,
-    values: Vec<Node>,
-    /// Per constraint, by each parameter.
-    gradients: Vec<Vec<Node>>,
-}
-
-impl StudyConstraints {
-    fn new(study: &Study) -> Self {
-        let written: Vec<Node> = study.constraints.iter().map(|constraint| constraint.value).collect();
-        let (mut graph, values) = study.graph.extract(&written);
-        let symbols: Vec<Symbol> = study.parameters.iter().map(|parameter| parameter.symbol).collect();
-        let by_parameter: Vec<Vec<Node>> = symbols.iter().map(|&symbol| graph.differentiate(&values, symbol)).collect();
-        let gradients =
-            (0..values.len()).map(|k| by_parameter.iter().map(|derivatives| derivatives[k]).collect()).collect();
-        Self { graph, symbols, values, gradients }
-    }
-}
-
-impl Constraints for StudyConstraints {
-    fn evaluate(&self, theta: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let value_of = |symbol: Symbol| {
-            self.symbols.iter().position(|other| *other == symbol).map_or(f64::NAN, |index| theta[index])
-        };
-        let at = |nodes: &[Node]| self.graph.evaluate(nodes, value_of, |_, _, _| f64::NAN);
-        (at(&self.values), self.gradients.iter().map(|gradient| at(gradient)).collect())
-    }
-}
-
-/// Share of its change over the bounds within which a constraint counts as active.
-const ACTIVE: f64 = 1e-5;
-
-/// Texts of the study's constraints that hold with equality at `theta`.
-pub fn active_constraints<'a>(study: &'a Study, theta: &[f64]) -> Vec<&'a str> {
-    let (values, gradients) = StudyConstraints::new(study).evaluate(theta);
-    let change = |gradient: &[f64]| {
-        gradient.iter().zip(&study.parameters).map(|(slope, p)| (slope * p.scale()).powi(2)).sum::<f64>().sqrt()
-    };
-    let active = |k: usize| values[k] >= -ACTIVE * change(&gradients[k]);
-    study.constraints.iter().enumerate().filter(|(k, _)| active(*k)).map(|(_, c)| c.text.as_str()).collect()
 }
 
 /// Levenberg-Marquardt with the study's bounds, constraints and prior knowledge; the best of all searches, and the costs of all.
@@ -210,18 +221,10 @@ fn minimise(
 ) -> Result<(Estimate, Vec<f64>), Diagnostic> {
     let bounds = bounds(&compiled.study);
     let constraints = StudyConstraints::new(&compiled.study);
-    let mut options = Options::default();
-    if let Some(limit) = settings.maximum_iterations {
-        options.maximum_iterations = limit;
-    }
-    let start: Vec<f64> = start
-        .iter()
-        .zip(&bounds.lower)
-        .zip(&bounds.upper)
-        .map(|((value, low), high)| value.clamp(*low, *high))
-        .collect();
+    let options = options(settings);
+    let start = inside(&bounds, start);
     let mut own = WithPriors { problem: &mut *problem, rows };
-    let first = constrained(&mut own, &constraints, &start, &bounds, &options, observer);
+    let first = crate::fit::minimise(settings.chosen, &mut own, &constraints, &start, &bounds, &options, observer);
     if further_starts == 0 {
         return Ok((first.map_err(|error| start_failure(compiled, &error))?, Vec::new()));
     }
@@ -230,7 +233,8 @@ fn minimise(
         .par_iter()
         .map(|point| {
             let mut own = WithPriors { problem: Problem { simulations: 0, failures: 0, ..problem.clone() }, rows };
-            let found = constrained(&mut own, &constraints, point, &bounds, &options, &mut |_| Control::Continue);
+            let quiet = &mut |_: &Progress| Control::Continue;
+            let found = crate::fit::minimise(settings.chosen, &mut own, &constraints, point, &bounds, &options, quiet);
             (own.problem, found)
         })
         .collect();
@@ -254,14 +258,41 @@ fn minimise(
     }
 }
 
-fn bounds(study: &Study) -> Bounds {
+/// One search over any residual of the study's parameters.
+pub(super) fn search_once<P: LeastSquares>(
+    compiled: &Compiled,
+    problem: &mut P,
+    start: &[f64],
+    settings: &Settings,
+    rows: &[PriorRow],
+    observer: &mut dyn FnMut(&Progress) -> Control,
+) -> Result<Estimate, Diagnostic> {
+    let bounds = bounds(&compiled.study);
+    let constraints = StudyConstraints::new(&compiled.study);
+    let mut own = WithPriors { problem, rows };
+    let start = inside(&bounds, start);
+    crate::fit::minimise(settings.chosen, &mut own, &constraints, &start, &bounds, &options(settings), observer)
+        .map_err(|error| start_failure(compiled, &error))
+}
+
+fn options(settings: &Settings) -> Options {
+    let default = Options::default();
+    let maximum_iterations = settings.maximum_iterations.unwrap_or(default.maximum_iterations);
+    Options { maximum_iterations, ..default }
+}
+
+fn inside(bounds: &Bounds, start: &[f64]) -> Vec<f64> {
+    start.iter().zip(&bounds.lower).zip(&bounds.upper).map(|((value, low), high)| value.clamp(*low, *high)).collect()
+}
+
+pub(super) fn bounds(study: &Study) -> Bounds {
     Bounds::new(
         study.parameters.iter().map(|parameter| parameter.lower).collect(),
         study.parameters.iter().map(|parameter| parameter.upper).collect(),
     )
 }
 
-fn start_failure(compiled: &Compiled, error: &FitError) -> Diagnostic {
+pub(super) fn start_failure(compiled: &Compiled, error: &FitError) -> Diagnostic {
     let diagnostic = Diagnostic::error(Code::FIT_FAILED, error.to_string());
     match error {
         FitError::StartOutsideBounds { index } | FitError::InvalidBounds { index } => {
@@ -272,7 +303,7 @@ fn start_failure(compiled: &Compiled, error: &FitError) -> Diagnostic {
     }
 }
 
-fn finish(
+pub(super) fn finish(
     mut estimate: Estimate,
     weighting: Weighting,
     problem: &Problem,
@@ -300,5 +331,12 @@ fn finish(
         iterations,
         simulations: problem.simulations,
         failed_simulations: problem.failures,
+        error: ErrorDefinition::Output,
+        equation: None,
+        gap: None,
+        process_noise: Vec::new(),
+        noise_levels: None,
+        whitening_orders: Vec::new(),
+        bands: Vec::new(),
     }
 }

@@ -4,7 +4,11 @@
 //! *In*: a compiled study with its records. *Out*: an [`Identification`]. *Must not happen here*: text of any kind,
 //! decisions about the model's structure.
 
+mod bands;
 mod confidence;
+mod constraints;
+mod definitions;
+mod errors;
 mod fitting;
 mod knowledge;
 mod noise;
@@ -14,9 +18,12 @@ mod result;
 mod saved;
 mod structures;
 mod weights;
+mod whitening;
 
 pub use confidence::{Confidence, confidence};
-pub use fitting::{Fitted, Settings, active_constraints, fit, prefilters};
+pub use constraints::active_constraints;
+pub use errors::{EquationFit, ErrorReport, OtherError, equation_error, error_report};
+pub use fitting::{Fitted, Settings, fit, prefilters};
 pub use problem::{Block, Problem};
 pub use report::identification;
 pub use result::*;

@@ -66,6 +66,19 @@ pub(super) fn models(fitted: &Fitted) -> Vec<NoiseModel> {
         .collect()
 }
 
+/// Share of the noise's power that its own past predicts, all blocks together; what the prefilter's colour predicts not counted.
+pub(super) fn predicted_share(fitted: &Fitted) -> f64 {
+    let (mut left, mut all) = (0.0, 0.0);
+    for (block, noise) in fitted.blocks.iter().zip(models(fitted)) {
+        let power = noise.model.power();
+        if power > 0.0 {
+            left += block.rows.len() as f64 * noise.model.variance / power;
+            all += block.rows.len() as f64;
+        }
+    }
+    if all > 0.0 { 1.0 - left / all } else { 0.0 }
+}
+
 /// Samples that a band up to the stop edge leaves independent.
 fn stride(fitted: &Fitted, record: usize) -> usize {
     let Some(design) = fitted.filters[record].design() else { return 1 };

@@ -4,7 +4,7 @@
 //! identity), S the channels' weights. Its gradient passes through the same chain (internal differentiation).
 
 use crate::fit::{EvaluationFailure, LeastSquares, transformed};
-use crate::signal::Prefilter;
+use crate::signal::{AutoRegression, Prefilter};
 use crate::simulation::{Compiled, Gradient, Record, Trajectory, simulate};
 use crate::study::Loss;
 use rayon::prelude::*;
@@ -18,6 +18,8 @@ pub struct Problem<'a> {
     pub prefilters: Vec<Prefilter>,
     /// Per measure of the study, 1/SI unit; the same for every record.
     pub weights: Vec<f64>,
+    /// Noise model per block, by which the weighted residual is whitened and scaled to variance one; empty: none.
+    pub whitening: Vec<Option<AutoRegression>>,
     pub simulations: usize,
     pub failures: usize,
 }
@@ -42,7 +44,7 @@ impl<'a> Problem<'a> {
         prefilters: Vec<Prefilter>,
         weights: Vec<f64>,
     ) -> Self {
-        Self { compiled, records, prefilters, weights, simulations: 0, failures: 0 }
+        Self { compiled, records, prefilters, weights, whitening: Vec::new(), simulations: 0, failures: 0 }
     }
 
     pub fn parameter_count(&self) -> usize {
@@ -65,6 +67,17 @@ impl<'a> Problem<'a> {
             }
         }
         blocks
+    }
+
+    /// Whitens a weighted column of a block.
+    fn whiten(&self, block: usize, column: &mut [f64]) {
+        if let Some(Some(model)) = self.whitening.get(block)
+            && model.variance > 0.0
+        {
+            model.whiten(column);
+            let deviation = model.variance.sqrt();
+            column.iter_mut().for_each(|value| *value /= deviation);
+        }
     }
 
     fn run(&mut self, theta: &[f64], gradient: Gradient) -> Result<Vec<Trajectory>, EvaluationFailure> {
@@ -100,11 +113,15 @@ impl<'a> Problem<'a> {
 
     fn stacked_residual(&self, trajectories: &[Trajectory]) -> Vec<f64> {
         let mut stacked = Vec::with_capacity(self.residual_count());
+        let mut block = 0;
         for (r, trajectory) in trajectories.iter().enumerate() {
             for (c, residual) in self.filtered_residuals(r, trajectory).into_iter().enumerate() {
                 let weight = self.weights[self.records[r].measures[c]];
                 let loss = self.compiled.study.solver.loss;
-                stacked.extend(residual.into_iter().map(|value| transformed(loss, weight * value).0));
+                let mut weighted: Vec<f64> = residual.iter().map(|value| weight * value).collect();
+                self.whiten(block, &mut weighted);
+                stacked.extend(weighted.into_iter().map(|value| transformed(loss, value).0));
+                block += 1;
             }
         }
         stacked
@@ -114,23 +131,28 @@ impl<'a> Problem<'a> {
         let (rows, columns) = (self.residual_count(), self.parameter_count());
         let mut gradient = vec![0.0; rows * columns];
         let loss = self.compiled.study.solver.loss;
-        let mut offset = 0;
+        let (mut offset, mut block) = (0, 0);
         for (r, trajectory) in trajectories.iter().enumerate() {
             let record = self.records[r];
             let samples = record.sample_count();
-            let residuals = if loss == Loss::Squares { Vec::new() } else { self.filtered_residuals(r, trajectory) };
+            let mut residuals = if loss == Loss::Squares { Vec::new() } else { self.filtered_residuals(r, trajectory) };
             for (c, &measure) in record.measures.iter().enumerate() {
+                if let Some(residual) = residuals.get_mut(c) {
+                    residual.iter_mut().for_each(|value| *value *= self.weights[measure]);
+                    self.whiten(block, residual);
+                }
                 for j in 0..columns {
                     let target = &mut gradient[j * rows + offset..j * rows + offset + samples];
                     target.copy_from_slice(&trajectory.gradient[c][j * samples..(j + 1) * samples]);
                     self.prefilters[r].apply(target);
                     target.iter_mut().for_each(|value| *value *= -self.weights[measure]);
+                    self.whiten(block, target);
                     if let Some(residual) = residuals.get(c) {
-                        let slope = |r: &f64| transformed(loss, self.weights[measure] * r).1;
-                        target.iter_mut().zip(residual).for_each(|(value, r)| *value *= slope(r));
+                        target.iter_mut().zip(residual).for_each(|(value, r)| *value *= transformed(loss, *r).1);
                     }
                 }
                 offset += samples;
+                block += 1;
             }
         }
         gradient
@@ -140,7 +162,8 @@ impl<'a> Problem<'a> {
     pub fn mean_squares(&self) -> Vec<f64> {
         self.blocks()
             .iter()
-            .map(|block| {
+            .enumerate()
+            .map(|(index, block)| {
                 let record = self.records[block.record];
                 let channel = record.measures.iter().position(|&measure| measure == block.measure);
                 let Some(channel) = channel else { return 0.0 };
@@ -149,7 +172,9 @@ impl<'a> Problem<'a> {
                 values.iter_mut().for_each(|value| *value -= mean);
                 self.prefilters[block.record].apply(&mut values);
                 let weight = self.weights[block.measure];
-                values.iter().map(|value| (weight * value).powi(2)).sum()
+                values.iter_mut().for_each(|value| *value *= weight);
+                self.whiten(index, &mut values);
+                values.iter().map(|value| value * value).sum()
             })
             .collect()
     }

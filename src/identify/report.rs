@@ -1,11 +1,13 @@
 //! From a fit to what a reader is shown: units of the study, intervals, discrepancy tree, remarks.
 
 use super::confidence::{Confidence, confidence};
-use super::fitting::{Fitted, active_constraints, prefilters};
+use super::constraints::active_constraints;
+use super::errors::error_report;
+use super::fitting::{Fitted, prefilters};
 use super::problem::Problem;
 use super::{ChannelFit, DiscrepancyNode, Identification, ParameterEstimate, RecordFit};
 use crate::simulation::{Compiled, Record, Trajectory, certify};
-use crate::study::{Group, Role};
+use crate::study::{ErrorDefinition, Group, Role};
 
 /// Reports `fitted` on all `records` (the estimation records among them). Records that cannot be simulated with these
 /// parameters are left out and mentioned in the remarks.
@@ -24,7 +26,9 @@ pub fn identification(compiled: &Compiled, fitted: &Fitted, records: &[&Record])
         }
     }
     remarks.extend(parameter_remarks(compiled, fitted, &confidence));
-    let gradient_digits = gradient_digits(compiled, fitted, records, &mut remarks);
+    remarks.extend(way_remarks(compiled, fitted, &confidence));
+    let estimation: Vec<&Record> = records.iter().copied().filter(|r| r.role == Role::Estimation).collect();
+    let gradient_digits = gradient_digits(compiled, fitted, &estimation, &mut remarks);
     Identification {
         variant: compiled.study.variant.clone(),
         parameters: parameters(compiled, fitted, &confidence),
@@ -45,6 +49,7 @@ pub fn identification(compiled: &Compiled, fitted: &Fitted, records: &[&Record])
         stop_reason: fitted.stop_reason.to_string(),
         gradient_digits,
         structure: None,
+        error: error_report(compiled, fitted, &estimation),
         remarks,
     }
 }
@@ -53,11 +58,10 @@ pub fn identification(compiled: &Compiled, fitted: &Fitted, records: &[&Record])
 fn gradient_digits(
     compiled: &Compiled,
     fitted: &Fitted,
-    records: &[&Record],
+    estimation: &[&Record],
     remarks: &mut Vec<String>,
 ) -> Option<f64> {
-    let estimation: Vec<&Record> = records.iter().copied().filter(|r| r.role == Role::Estimation).collect();
-    match certify(compiled, &estimation, &fitted.theta) {
+    match certify(compiled, estimation, &fitted.theta) {
         Ok(digits) => digits,
         Err(failure) => {
             remarks.push(format!("the gradient could not be checked: {failure}"));
@@ -130,6 +134,38 @@ fn parameter_remarks(compiled: &Compiled, fitted: &Fitted, confidence: &Confiden
         remarks.push(format!("{} simulations failed and shortened a step", fitted.failed_simulations));
     }
     remarks
+}
+
+/// The way to the result: bands, noise models.
+fn way_remarks(compiled: &Compiled, fitted: &Fitted, confidence: &Confidence) -> Vec<String> {
+    let mut remarks: Vec<String> = fitted
+        .bands
+        .iter()
+        .map(|(stop, discrepancy)| {
+            format!("fitted first below {} Hz: discrepancy {discrepancy:.2} % there", number(*stop))
+        })
+        .collect();
+    let channel = |index: usize| compiled.study.measures[fitted.blocks[index].measure].name.as_str();
+    for (index, order) in fitted.whitening_orders.iter().enumerate().filter(|(_, order)| **order > 0) {
+        remarks.push(format!(
+            "noise of {} modelled as autoregressive of order {order}, and weighted by it",
+            channel(index)
+        ));
+    }
+    let coloured = confidence.noise_orders.iter().enumerate().filter(|(_, order)| **order > 0);
+    let coloured: Vec<&str> = coloured.map(|(index, _)| channel(index)).collect();
+    if fitted.whitening_orders.is_empty() && fitted.error != ErrorDefinition::Equation && !coloured.is_empty() {
+        remarks.push(format!(
+            "coloured residual in {}: the intervals know of it; `--noise coloured` weights by it, too",
+            coloured.join(", ")
+        ));
+    }
+    remarks
+}
+
+fn number(value: f64) -> String {
+    let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{value:.digits$}")
 }
 
 /// One record, with V and V_mean of its channels summed.

@@ -1,5 +1,6 @@
 //! What an identification found. Values of parameters and channels are in the unit the study wrote; times in s.
 
+use super::errors::ErrorReport;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -37,6 +38,8 @@ pub struct Identification {
     /// How the structure stands against the first one; only where several are compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub structure: Option<Structure>,
+    /// What counted as error between model and measurement, and why.
+    pub error: ErrorReport,
     /// Anything a reader must know: parameters at bounds, missing influence, fallbacks.
     pub remarks: Vec<String>,
 }

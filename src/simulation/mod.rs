@@ -11,6 +11,7 @@ mod manoeuvre;
 mod prepare;
 mod run;
 mod slowness;
+mod stretch;
 mod tangent;
 
 pub use certificate::certify;
@@ -20,3 +21,4 @@ pub use manoeuvre::{excitation, manoeuvre};
 pub use prepare::{Record, prepare};
 pub use run::{Compiled, Gradient, Trajectory, probe, simulate, slowness};
 pub use slowness::{Limit, Slowness};
+pub use stretch::{Observation, State, Stretch, Stretches, stretches_refused};

@@ -4,7 +4,7 @@ use super::checker::{Allowed, Checker, Entity, Scope};
 use super::declarations::Experiment as Declared;
 use super::fields::{find, value_span};
 use super::identify::written_unit;
-use super::model::{Experiment, Filter, Loss, Method, Role, Solver, Start, StartBase};
+use super::model::{ErrorDefinition, Experiment, Filter, Loss, Method, Role, Solver, Start, StartBase};
 use crate::diagnostics::{Code, Diagnostic, similar_name};
 use crate::expression::{Node, Symbol};
 use crate::quantities::Dimension;
@@ -327,9 +327,15 @@ impl<'a> Checker<'a> {
     }
 
     pub fn finished_solver(&mut self) -> Solver {
-        let mut solver = Solver { relative_tolerance: 1e-6, method: Method::Automatic, loss: Loss::Squares };
+        let mut solver = Solver {
+            relative_tolerance: 1e-6,
+            method: Method::Automatic,
+            loss: Loss::Squares,
+            error: ErrorDefinition::Output,
+            coloured_noise: false,
+        };
         let Some(fields) = self.declared.solver else { return solver };
-        self.known_fields("`solver`", fields, &["tolerance", "method", "loss"]);
+        self.known_fields("`solver`", fields, &["tolerance", "method", "loss", "error", "noise"]);
         if let Some(field) = find(fields, "tolerance")
             && let Some(expression) = self.field_expression(field)
             && let Some(value) = self.fixed_number(expression, None, Dimension::ONE, (field.key.span, "`tolerance`"))
@@ -346,6 +352,10 @@ impl<'a> Checker<'a> {
         let word =
             find(fields, "method").and_then(|field| self.field_word(field, &["automatic", "bdf", "runge_kutta"]));
         let loss = find(fields, "loss").and_then(|field| self.field_word(field, &["squares", "huber", "student"]));
+        let error = find(fields, "error").and_then(|field| self.field_word(field, &ErrorDefinition::NAMES));
+        solver.error = error.and_then(ErrorDefinition::from_name).unwrap_or_default();
+        let noise = find(fields, "noise").and_then(|field| self.field_word(field, &["white", "coloured"]));
+        solver.coloured_noise = noise == Some("coloured");
         solver.loss = match loss {
             Some("huber") => Loss::Huber,
             Some("student") => Loss::Student,

@@ -516,6 +516,37 @@ pub struct Solver {
     pub relative_tolerance: f64,
     pub method: Method,
     pub loss: Loss,
+    pub error: ErrorDefinition,
+    /// Coloured noise is modelled and the cost weighted by it (pre-whitening).
+    pub coloured_noise: bool,
+}
+
+/// What counts as error between model and measurement.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ErrorDefinition {
+    /// Free simulation from the start.
+    #[default]
+    Output,
+    /// Measured states in the equations of motion.
+    Equation,
+    /// One-step predictions by an extended Kalman filter.
+    Filter,
+    /// Stretches that the fit joins.
+    Shooting,
+}
+
+impl ErrorDefinition {
+    pub const ALL: [Self; 4] = [Self::Output, Self::Equation, Self::Filter, Self::Shooting];
+    /// As written in the study, in the order of [`ErrorDefinition::ALL`].
+    pub const NAMES: [&str; 4] = ["output", "equation", "filter", "shooting"];
+
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().zip(Self::NAMES).find(|(own, _)| **own == self).map_or("", |(_, name)| name)
+    }
+
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|own| own.name() == name)
+    }
 }
 
 /// How residuals count in the cost.

@@ -2,6 +2,7 @@
 
 mod combination;
 mod coverage;
+mod definitions;
 mod nuisance;
 mod plan;
 mod shipped;

@@ -140,6 +140,12 @@ pub fn identification(variant: &str, parameters: Vec<ParameterEstimate>, records
         stop_reason: "relative change of the cost below 1e-8".into(),
         gradient_digits: Some(7.4),
         structure: None,
+        error: ident::identify::ErrorReport {
+            used: "output".into(),
+            reason: "free simulation from the experiment's start".into(),
+            others: vec![ident::identify::OtherError { name: "equation".into(), why: "`strut.z` not measured".into() }],
+            process_noise: vec![],
+        },
         remarks: vec![],
         parameters,
         records,

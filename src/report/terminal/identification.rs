@@ -160,8 +160,21 @@ fn work_section(sheet: &mut Sheet, fit: &Identification) {
         ),
         2,
     );
+    error_section(sheet, fit);
     if let Some(digits) = fit.gradient_digits {
         sheet.paragraph(&format!("gradient agrees with an independent one to {} digits", number::fixed(digits, 1)), 2);
+    }
+}
+
+/// What counted as error, and why nothing else did.
+fn error_section(sheet: &mut Sheet, fit: &Identification) {
+    let error = &fit.error;
+    sheet.paragraph(&format!("error: {}; {}", error.used, error.reason), 2);
+    for (state, level) in &error.process_noise {
+        sheet.item(&format!("process noise on {state}: {} (SI, per root of Hz)", number::significant(*level, 3)));
+    }
+    for other in &error.others {
+        sheet.item(&format!("not {}: {}", other.name, other.why));
     }
 }
 

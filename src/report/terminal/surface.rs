@@ -27,6 +27,10 @@ pub fn courses(courses: &Courses, colour: Colour) -> String {
         ]);
     }
     sheet.table(&table, 2);
+    sheet.paragraph(&format!("Searched: {}.", courses.parameters.join(", ")), 2);
+    if !courses.held.is_empty() {
+        sheet.paragraph(&format!("Held at their estimates: {}.", courses.held.join(", ")), 2);
+    }
     sheet.paragraph("A gradient by internal differentiation counts as one simulation per parameter more.", 2);
     sheet.finish()
 }

@@ -1,0 +1,77 @@
+//! Pre-whitening: coloured noise modelled as autoregressive, the cost weighted by it, iterated to convergence.
+
+use super::fitting::{Fitted, Settings, finish, search_once};
+use super::problem::Problem;
+use crate::diagnostics::{Code, Diagnostic};
+use crate::fit::{Control, LeastSquares, Progress, StopReason};
+use crate::signal::AutoRegression;
+use crate::simulation::Compiled;
+use crate::study::Parameter;
+
+/// Largest order of a noise model.
+const LARGEST_ORDER: usize = 24;
+const ROUNDS: usize = 10;
+/// Parameters that move by less than this share of their bounds between two rounds are settled.
+const SETTLED: f64 = 1e-6;
+
+/// The fit repeated with a noise model per channel and record, taken from its own residual, until neither changes. A
+/// prefilter takes the place of the noise model: records behind one stay as they are.
+///
+/// # Errors
+/// The model cannot be evaluated where the fit without noise models ended.
+pub(super) fn whitened(
+    compiled: &Compiled,
+    mut problem: Problem,
+    white: Fitted,
+    settings: &Settings,
+    observer: &mut dyn FnMut(&Progress) -> Control,
+) -> Result<Fitted, Diagnostic> {
+    let scales: Vec<f64> = compiled.study.parameters.iter().map(Parameter::scale).collect();
+    let blocks = problem.blocks();
+    let mut residual = white.residual.clone();
+    let mut theta = white.theta.clone();
+    let mut iterations = white.iterations;
+    for round in 1.. {
+        let models: Vec<Option<AutoRegression>> = blocks
+            .iter()
+            .map(|block| {
+                let filtered = problem.prefilters[block.record].design().is_some();
+                (!filtered).then(|| AutoRegression::choose(&residual[block.rows.clone()], LARGEST_ORDER))
+            })
+            .collect();
+        problem.whitening = models;
+        let estimate = search_once(compiled, &mut problem, &theta, settings, &white.prior_rows, observer)?;
+        iterations += estimate.iterations;
+        let moved = estimate.theta.iter().zip(&theta).zip(&scales).map(|((a, b), scale)| (a - b).abs() / scale);
+        let settled = moved.fold(0.0, f64::max) < SETTLED;
+        theta.clone_from(&estimate.theta);
+        if settled || round == ROUNDS || estimate.stop_reason == StopReason::Interrupted {
+            let mut fitted =
+                finish(estimate, white.weighting.clone(), &problem, white.cost_history.clone(), iterations);
+            fitted.noise_levels = Some(levels(&problem, &white));
+            fitted.whitening_orders =
+                problem.whitening.iter().map(|model| model.as_ref().map_or(0, AutoRegression::order)).collect();
+            (fitted.prior_rows, fitted.start_costs, fitted.bands) = (white.prior_rows, white.start_costs, white.bands);
+            return Ok(fitted);
+        }
+        let models = std::mem::take(&mut problem.whitening);
+        let failed = |explanation: String| Diagnostic::error(Code::FIT_FAILED, explanation);
+        residual = problem.residual(&theta).map_err(|failure| failed(failure.explanation))?;
+        problem.whitening = models;
+    }
+    Ok(white)
+}
+
+/// Standard deviation of the noise per measure, SI: of the process that each model stands for.
+fn levels(problem: &Problem, white: &Fitted) -> Vec<Option<f64>> {
+    let mut sums = vec![(0.0, 0.0); problem.weights.len()];
+    for (block, model) in problem.blocks().iter().zip(&problem.whitening) {
+        let weight = white.weighting.weights[block.measure];
+        if let (Some(model), true) = (model, weight > 0.0) {
+            let count = block.rows.len() as f64;
+            sums[block.measure].0 += count * model.power() / (weight * weight);
+            sums[block.measure].1 += count;
+        }
+    }
+    sums.into_iter().map(|(sum, count)| (count > 0.0).then(|| (sum / count).sqrt())).collect()
+}
