@@ -19,8 +19,9 @@ fn table(text: &mut String, sort: &str, declared: &[Declared]) {
 
 fn reference() -> String {
     let mut text = String::from(
-        "# The prelude\n\nLaws and effects that ship with the tool. They are written in the language itself \
-         (`grammar/prelude`); this page is made from their remarks. The line that begins with `=` is the characteristic.\n",
+        "# The prelude\n\nLaws, models and effects that ship with the tool. They are written in the language itself \
+         (`grammar/prelude`); this page is made from their remarks. The line that begins with `=` is the characteristic; `ident law NAME \
+         --figure FILE` draws it with the numbers of the example.\n",
     );
     let loaded = load_text("empty", "study s");
     for (tree, _) in loaded.trees().filter(|(_, is_prelude)| *is_prelude) {
@@ -40,6 +41,14 @@ fn reference() -> String {
                     table(&mut rows, "amplitude", &effect.amplitudes);
                     table(&mut rows, "shape", &effect.shapes);
                     (format!("effect `{}`", effect.name.text), rows)
+                }
+                ItemKind::Model(model) => {
+                    let mut rows = String::new();
+                    for port in &model.ports {
+                        let _ = writeln!(rows, "| port | `{}` | {} | |", port.name.text, port.kind.text);
+                    }
+                    table(&mut rows, "parameter", &model.parameters);
+                    (format!("model `{}`", model.name.text), rows)
                 }
                 _ => continue,
             };

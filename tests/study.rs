@@ -2,6 +2,8 @@
 
 #[path = "study/actuators.rs"]
 mod actuators;
+#[path = "study/bushing.rs"]
+mod bushing;
 #[path = "study/evaluate.rs"]
 mod evaluate;
 #[path = "study/inlining.rs"]

@@ -142,10 +142,13 @@ impl<'a> Checker<'a> {
         };
         let axis = path.text.rsplit_once('.').and_then(|(body, letter)| {
             let index = ["x", "y", "z"].iter().position(|axis| *axis == letter)?;
-            // A port may stand for a point of the body.
+            // A port may stand for a point of the body, or for ground.
             let (body, _) = self.split_path(body);
+            if body == "ground" {
+                return Some((None, index));
+            }
             let body = self.declared.bodies.iter().position(|declared| declared.name.text == body)?;
-            Some((body, index))
+            Some((Some(body), index))
         });
         let Some((body, index)) = axis else {
             let bodies = self.declared.bodies.iter().map(|body| body.name.text.as_str());
@@ -158,7 +161,7 @@ impl<'a> Checker<'a> {
         };
         let mut vector = [0.0; 3];
         vector[index] = if *negative { -1.0 } else { 1.0 };
-        Some(ForceDirection { axis: vector, body: Some(body), motion })
+        Some(ForceDirection { axis: vector, body, motion })
     }
 
     /// What a name means as place of an element: the axis of a joint comes before the joint.

@@ -6,11 +6,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
-/// Laws and effects that ship with the tool: (name, text).
-const PRELUDE: [(&str, &str); 4] = [
+/// Laws, models and effects that ship with the tool: (name, text).
+const PRELUDE: [(&str, &str); 5] = [
     ("prelude/laws.ident", include_str!("../../grammar/prelude/laws.ident")),
     ("prelude/actuators.ident", include_str!("../../grammar/prelude/actuators.ident")),
     ("prelude/sensors.ident", include_str!("../../grammar/prelude/sensors.ident")),
+    ("prelude/models.ident", include_str!("../../grammar/prelude/models.ident")),
     ("prelude/effects.ident", include_str!("../../grammar/prelude/effects.ident")),
 ];
 

@@ -354,10 +354,18 @@ impl<'t, 'd> Elaborator<'t, 'd> {
     fn check_dotted_names(&mut self) {
         let parts: BTreeSet<&str> = self.flat.parts.iter().map(|part| part.text.as_str()).collect();
         let mut wrong: Vec<(Name, String)> = Vec::new();
+        // Numbers given to a part; their group may have a name, too.
+        let arguments: BTreeSet<String> = self
+            .flat
+            .arguments
+            .iter()
+            .map(|argument| format!("{}.{}", argument.part, argument.declared.text))
+            .collect();
         let names = self.flat.items.iter().filter_map(|item| variants::declared_name(&item.item.kind));
         for name in names.chain(&self.flat.parts) {
             if let Some((owner, _)) = name.text.rsplit_once('.')
                 && !parts.contains(owner)
+                && !arguments.contains(&name.text)
             {
                 wrong.push((name.clone(), owner.to_owned()));
             }
