@@ -2,8 +2,9 @@
 //!
 //! *In*: a compiled study with manoeuvres and criteria, an estimate with its covariance. *Out*: per criterion its value,
 //! interval and verdict ([`Validity`]); before any test, what
-//! the offered excitations and sensors would tell ([`Plan`]). *Must not happen here*: fits, files, text for a terminal.
+//! the offered excitations and sensors would tell ([`Plan`]); what a single law does ([`Characteristic`]). *Must not happen here*: fits, files, text for a terminal.
 
+mod characteristic;
 mod courses;
 mod criterion;
 mod cuts;
@@ -12,6 +13,7 @@ mod monte_carlo;
 mod plan;
 mod validity;
 
+pub use characteristic::{Characteristic, Course as LawCourse, Demonstration, Trace, characteristic, laws};
 pub use courses::{Course, Courses, courses};
 pub use criterion::{CriterionValues, evaluate};
 pub use cuts::{Cut, CutCurve, Cuts, cuts};

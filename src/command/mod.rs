@@ -11,6 +11,7 @@ mod diagnose;
 mod explain;
 mod fit;
 mod format;
+mod law;
 mod new;
 mod optimisers;
 mod output;
@@ -59,6 +60,8 @@ enum Command {
     Fmt(format::Arguments),
     /// Start a study
     New(new::Arguments),
+    /// Show a law: its remark, its text, its characteristic as a picture
+    Law(law::Arguments),
     /// Explain a diagnostic code
     Explain(explain::Arguments),
 }
@@ -114,6 +117,7 @@ pub fn run() -> ExitCode {
         Command::Validate(arguments) => validate::run(&arguments),
         Command::Fmt(arguments) => format::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
+        Command::Law(arguments) => law::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
     };
     match outcome {

@@ -49,6 +49,9 @@ pub fn integrate<D: Dynamics + ?Sized>(
     options: &Options,
 ) -> Result<Solution, Failure> {
     check(dynamics, start, times, options)?;
+    if dynamics.dimension() == 0 {
+        return Ok(without_states(times, options));
+    }
     let mut run = Run::new(dynamics, start, times, options);
     if !run.is_possible() {
         return Err(invalid(start.time, None));
@@ -68,6 +71,13 @@ pub fn integrate<D: Dynamics + ?Sized>(
         }
     }
     Ok(run.recorder.finish(run.system.work))
+}
+
+/// Where every motion is prescribed there is nothing to integrate.
+fn without_states(times: &[f64], options: &Options) -> Solution {
+    let work =
+        Work { method: "none", reason: "every motion is a given function of time".to_owned(), ..Work::default() };
+    Solution { times: times.to_vec(), work, plan: options.record_plan.then(Plan::default), ..Solution::default() }
 }
 
 /// Ends of the segments between start, breakpoints and last requested time; true where it is a breakpoint.

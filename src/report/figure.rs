@@ -30,6 +30,7 @@ path{fill:none}.paper{fill:#fff}.grid{stroke:#e9ecef}.zero{stroke:#c5ccd3}.frame
 .few{stroke-opacity:.35}.some{stroke-opacity:.65}.cloud.after.few,.cloud.after.some{stroke-opacity:.8}\
 .dot.missing{fill:#7a8794}.dot.after{fill:#0072b2}.ring{fill:#fff;stroke:#1b1f24;stroke-width:1.3}";
 
+pub use super::characteristic::characteristic;
 pub use super::surface::{courses, cuts};
 
 /// A picture of its own with a title.

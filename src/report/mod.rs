@@ -19,6 +19,7 @@ pub mod json;
 pub mod number;
 pub mod page;
 
+mod characteristic;
 mod surface;
 pub mod terminal;
 mod words;

@@ -202,7 +202,7 @@ impl<'a> Checker<'a> {
         let message = format!("`{function}` works on inputs and functions of time only");
         let diagnostic = Diagnostic::error(Code::NOT_AN_INPUT, message)
             .label(at, format!("depends on `{}`", self.graph.symbol_name(foreign)))
-            .help("its past is not kept; a lag with a state may serve (see the laws `pt1` and `pt2_filter`)");
+            .help("its past is not kept; `pade_delay` is a law that delays any signal, to second order; a lag (`pt1`) may serve, too");
         self.fail(diagnostic, scope)
     }
 

@@ -68,7 +68,7 @@ fn a_servo_obeys_its_limits() {
         let found = channels(&text);
         let omega = TAU * 10.0;
         let load = |t: f64, x: f64, v: f64| {
-            let reference = stroke * (command(t) / stroke).tanh();
+            let reference = command(t).clamp(-stroke, stroke);
             let wanted = rate * (omega / 1.6 * (reference - x) / rate).tanh();
             let demand = acceleration * (1.6 * omega * (wanted - v) / acceleration).tanh();
             force * (3.0 * demand / force).tanh()
@@ -84,7 +84,8 @@ fn a_servo_obeys_its_limits() {
     let linear = by_hand([0.0, 0.0], |t, [x, v]| [v, omega * omega * (command(t) - x) - 1.6 * omega * v]);
     agree(&free[0], linear.iter().map(|y| y[0]), "linear");
     let stroke = case(0.01, 1e3, 1e5, 1e6);
-    assert!(largest(&free[0]) > 0.045 && largest(&stroke[0]) < 0.0102);
+    // From one end of the stroke to the other it overshoots by 1.5 % of the way.
+    assert!(largest(&free[0]) > 0.045 && largest(&stroke[0]) < 0.01 + 0.016 * 0.02 && largest(&stroke[0]) > 0.01);
     let rate = case(1e3, 0.2, 1e5, 1e6);
     assert!(largest(&free[1]) > 0.5 && largest(&rate[1]) < 0.2 && largest(&rate[1]) > 0.19);
     let acceleration = case(1e3, 1e3, 4.0, 1e6);
@@ -110,15 +111,15 @@ fn drives_and_actuators_of_first_and_second_order() {
     let lag = by_hand([0.0], |t, [z]| [(200.0 * command(t) - z) / 0.04]);
     agree(&found[0], lag.iter().map(|y| y[0]), "pt1_drive");
     let limited = by_hand([0.0], |t, [z]| {
-        let wanted = 8.0 * (200.0 * command(t) / 8.0).tanh();
+        let wanted = (200.0 * command(t)).clamp(-8.0, 8.0);
         [60.0 * ((wanted - z) / 0.04 / 60.0).tanh()]
     });
     agree(&found[1], limited.iter().map(|y| y[0]), "limited_pt1_drive");
-    let lag = by_hand([0.0], |t, [z]| [0.3 * ((0.04 * (command(t) / 0.04).tanh() - z) / 0.02 / 0.3).tanh()]);
+    let lag = by_hand([0.0], |t, [z]| [0.3 * ((command(t).clamp(-0.04, 0.04) - z) / 0.02 / 0.3).tanh()]);
     agree(&found[2], lag.iter().map(|y| y[0]), "limited_pt1");
     let omega = TAU * 8.0;
     let second = by_hand([0.0, 0.0], |t, [z, w]| {
-        let wanted = 0.4 * (omega / 1.2 * (0.04 * (command(t) / 0.04).tanh() - z) / 0.4).tanh();
+        let wanted = 0.4 * (omega / 1.2 * (command(t).clamp(-0.04, 0.04) - z) / 0.4).tanh();
         [w, 9.0 * (1.2 * omega * (wanted - w) / 9.0).tanh()]
     });
     agree(&found[3], second.iter().map(|y| y[0]), "limited_pt2");
