@@ -326,6 +326,19 @@ codes! {
      \n    experiment fit_1 estimation { data = \"a.csv\", window = 0 s .. 10 s, start = rest }\n\
      \x20   experiment check_1 validation { data = \"a.csv\", window = 10 s .. 20 s, start = rest }\n"
 
+    MODE_FILE "E0260" "file of modes"
+    "An elastic body takes its modes from a CSV file: one head line with the columns and their units, then one line per mode.\n\
+     Needed are `frequency [Hz]`, the integrals of the shape over the mass `participation_x [kg]` .. `_z` and `moment_x [kg*m]` .. `_z`,\n\
+     `damping [1]` unless the body says `damping_ratio`, and per frame six columns. All for a modal mass of 1 kg:\n\
+     \n\
+     \x20   mode,frequency [Hz],damping [1],participation_x [kg],..,moment_z [kg*m],tip.shift_x,..,tip.turn_z [rad/m]\n\
+     \x20   1,12.5,0.01,0,..,0.3,0,..,2.1\n"
+
+    MODE_FRAME "E0261" "frame without mode shapes"
+    "What stands on an elastic body moves with its modes. For every point of the body that a joint, a force or a measure uses, the\n\
+     file of modes has the columns `tip.shift_x`, `tip.shift_y`, `tip.shift_z`, `tip.turn_x [rad/m]`, `tip.turn_y [rad/m]`, `tip.turn_z [rad/m]`\n\
+     (zeros where a mode does not move it). The body by itself (`beam`) is the undeformed frame in which the modes are given.\n"
+
     // ---- E03xx: mechanics ----
 
     UNCONNECTED_BODY "E0301" "body is not connected to ground"
@@ -382,6 +395,13 @@ codes! {
     CANNOT_ASSEMBLE "E0311" "loop cannot be assembled"
     "Near the start no position of the bodies closes all loops. Either a length is wrong (the sides of a four-bar that is too long to\n\
      reach), or the start is too far away: give the joints' positions in `start`.\n"
+
+    MODE_NORMALISATION "E0313" "modes are too large"
+    "Modes are scaled so that each has a modal mass of 1 kg: the integral of the squared shape over the mass. Then the part of the\n\
+     mass that a mode can take along, `participation^2 / 1 kg`, is never more than the body's mass, likewise for its moments of\n\
+     inertia, and all modes together take no more than there is. Otherwise no body has these modes: the shapes are scaled otherwise\n\
+     (to a largest deflection of 1, or for other units), or `mass` and `inertia` of the body do not belong to them.\n\
+     Divide every shape by the root of its modal mass in kg.\n"
 
     // ---- E04xx: data files and signals ----
 

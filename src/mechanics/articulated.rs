@@ -1,6 +1,7 @@
 //! Accelerations by the articulated-body algorithm on expressions (Featherstone-2008, table 7.1).
 
 use super::kinematics::{FrameMotion, SpatialMotion, carry, motion_axis};
+use super::modal_pass::{Modes, Reduced};
 use super::topology::{Coordinate, Link, Seat, Tree};
 use crate::expression::vector::{self, Matrix, Vector};
 use crate::expression::{Graph, Node};
@@ -101,7 +102,7 @@ impl Inertia {
     }
 
     /// `I - U (U / D)^T`.
-    fn without(&self, graph: &mut Graph, along: Wrench, scaled: Wrench) -> Inertia {
+    pub fn without(&self, graph: &mut Graph, along: Wrench, scaled: Wrench) -> Inertia {
         let mut reduce = |m: Matrix, left: Vector, right: Vector| -> Matrix {
             std::array::from_fn(|i| {
                 std::array::from_fn(|j| {
@@ -140,7 +141,7 @@ fn ratio(graph: &mut Graph, along: Wrench, divisor: Node) -> Wrench {
 }
 
 /// Inertia of a body about the origin of the link it sits on, in the link's axes.
-fn body_inertia(graph: &mut Graph, body: &Body, seat: Seat) -> Inertia {
+pub(super) fn body_inertia(graph: &mut Graph, body: &Body, seat: Seat) -> Inertia {
     let [xx, yy, zz, xy, xz, yz] = body.inertia;
     let central = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
     let central = vector::turn_symmetric(graph, seat.rotation, central);
@@ -163,7 +164,7 @@ pub(super) fn link_inertias(graph: &mut Graph, study: &Study, tree: &Tree) -> Ve
         .map(|link| {
             let mut sum = Inertia::zero(graph);
             for &body in &link.bodies {
-                let own = body_inertia(graph, &study.bodies[body], tree.seats[body]);
+                let own = body_inertia(graph, &study.bodies[body], tree.undeformed[body]);
                 sum = sum.add(graph, own);
             }
             sum
@@ -199,14 +200,27 @@ pub(super) fn articulated_bodies(
     let mut inertia = inertias.to_vec();
     let mut bias: Vec<Wrench> = (0..count)
         .map(|i| {
-            let gyroscopic = velocity_load(graph, &frames[i], &inertias[i]);
+            let gyroscopic = velocity_load(graph, tree, i, &frames[i], &inertias[i]);
             gyroscopic.subtract(graph, wrenches[i])
         })
         .collect();
     let mut along: Vec<Wrench> = Vec::new();
     let mut moved: Vec<(Node, Node)> = Vec::new();
+    let mut modes = Modes::new(graph, tree);
     for i in (0..count).rev() {
         let frame = &frames[i];
+        if let Some(open) = open_modes(graph, tree, i, axes[i], frame, loads[i], (inertia[i], bias[i]), &mut modes) {
+            along.push(Wrench::zero(graph));
+            moved.push((open.1, open.2));
+            if let Some(p) = tree.links[i].predecessor {
+                let (carried, total) =
+                    (open.0.inertia.carried_back(graph, frame), open.0.bias.carried_back(graph, frame));
+                inertia[p] = inertia[p].add(graph, carried);
+                bias[p] = bias[p].add(graph, total);
+                modes.carry_back(graph, i, p, frame);
+            }
+            continue;
+        }
         let u = inertia[i].apply(graph, axes[i]);
         let divisor = u.on(graph, axes[i]);
         let resisting = bias[i].on(graph, axes[i]);
@@ -250,9 +264,16 @@ pub(super) fn articulated_bodies(
         let angular = vector::add(graph, angular, frame.angular_bias);
         let linear = vector::add(graph, linear, frame.bias);
         let (divisor, driving) = moved[i];
-        let acceleration = match given_acceleration(graph, &tree.links[i]) {
-            Some(given) => given,
-            None => {
+        let earlier = |link: usize| result[link].acceleration;
+        let acceleration = match (given_acceleration(graph, &tree.links[i]), tree.links[i].coordinate) {
+            (Some(given), _) => given,
+            (None, Coordinate::Follower { weights, .. }) => weighted(graph, &tree.weights[weights], earlier),
+            (None, Coordinate::Mode { .. }) => {
+                let taken = modes.taken(graph, i, (angular, linear), earlier);
+                let rest = graph.subtract(driving, taken);
+                graph.divide(rest, divisor)
+            }
+            _ => {
                 let carried = along[i].on(graph, (angular, linear));
                 let rest = graph.subtract(driving, carried);
                 graph.divide(rest, divisor)
@@ -277,13 +298,53 @@ fn given_acceleration(graph: &mut Graph, link: &Link) -> Option<Node> {
     match link.coordinate {
         Coordinate::Prescribed { motion, .. } => Some(motion[2]),
         Coordinate::Weld => Some(graph.constant(0.0)),
-        Coordinate::Free { .. } | Coordinate::Rotation { .. } => None,
+        Coordinate::Free { .. }
+        | Coordinate::Rotation { .. }
+        | Coordinate::Mode { .. }
+        | Coordinate::Follower { .. } => None,
     }
 }
 
+/// The step inwards over a link of an elastic body: reduced inertia and bias, and for a mode its divisor and driving load.
+#[allow(clippy::too_many_arguments, reason = "one step of the algorithm above, which holds all of them")]
+fn open_modes(
+    graph: &mut Graph,
+    tree: &Tree,
+    link: usize,
+    axis: (Vector, Vector),
+    frame: &FrameMotion,
+    load: Node,
+    own: (Inertia, Wrench),
+    modes: &mut Modes,
+) -> Option<(Reduced, Node, Node)> {
+    let one = graph.constant(1.0);
+    match tree.links[link].coordinate {
+        Coordinate::Mode { .. } => Some(modes.eliminate(graph, link, load, own)),
+        Coordinate::Follower { weights, .. } => {
+            let reduced = modes.follow(graph, (link, axis), &tree.weights[weights], frame, own);
+            Some((reduced, one, one))
+        }
+        _ => None,
+    }
+}
+
+/// The sum of values with weights.
+fn weighted(graph: &mut Graph, weights: &[(usize, Node)], value: impl Fn(usize) -> Node) -> Node {
+    let mut sum = graph.constant(0.0);
+    for &(link, weight) in weights {
+        let share = graph.multiply(weight, value(link));
+        sum = graph.add(sum, share);
+    }
+    sum
+}
+
 /// v x* (I v): centrifugal and gyroscopic load.
-fn velocity_load(graph: &mut Graph, frame: &FrameMotion, inertia: &Inertia) -> Wrench {
-    let momentum = inertia.apply(graph, (frame.angular_velocity, frame.velocity));
+fn velocity_load(graph: &mut Graph, tree: &Tree, link: usize, frame: &FrameMotion, inertia: &Inertia) -> Wrench {
+    let mut momentum = inertia.apply(graph, (frame.angular_velocity, frame.velocity));
+    if let Some(modal) = tree.modal.iter().find(|modal| modal.seat() == link) {
+        let own = modal.momentum(graph);
+        momentum = momentum.add(graph, own);
+    }
     let turned = vector::cross(graph, frame.angular_velocity, momentum.moment);
     let dragged = vector::cross(graph, frame.velocity, momentum.force);
     Wrench {

@@ -27,7 +27,8 @@ pub(super) fn assemble(
     meaning: &HashMap<Symbol, Node>,
     (loops, reactions): (Loops, Vec<(ReactionQuantity, Node)>),
 ) -> Result<System, Vec<Diagnostic>> {
-    let moving: Vec<usize> = tree.links_of_joint.iter().flatten().copied().collect();
+    let modes = tree.modal.iter().flat_map(|modal| &modal.links);
+    let moving: Vec<usize> = tree.links_of_joint.iter().flatten().chain(modes).copied().collect();
     let projection = loops.projection(&mut graph, tree, frames);
     let mut states = state_variables(study, tree, &moving);
     if let Some(closed) = loops.closed.first() {
@@ -73,7 +74,7 @@ pub(super) fn assemble(
 /// Rates of the positions that belong to a link.
 fn position_rates(graph: &mut Graph, tree: &Tree, link: usize, projection: &[Node]) -> Vec<Node> {
     match tree.links[link].coordinate {
-        Coordinate::Free { symbols, .. } => {
+        Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => {
             let velocity = graph.variable(symbols.velocity);
             vec![graph.add(velocity, projection[link])]
         }
@@ -85,7 +86,10 @@ fn position_rates(graph: &mut Graph, tree: &Tree, link: usize, projection: &[Nod
             let rates: Vector = std::array::from_fn(|k| rate(graph, k));
             quaternion_rates(graph, symbols.quaternion, rates)
         }
-        Coordinate::Rotation { .. } | Coordinate::Prescribed { .. } | Coordinate::Weld => vec![],
+        Coordinate::Rotation { .. }
+        | Coordinate::Prescribed { .. }
+        | Coordinate::Weld
+        | Coordinate::Follower { .. } => vec![],
     }
 }
 
@@ -142,7 +146,7 @@ fn state_variables(study: &Study, tree: &Tree, moving: &[usize]) -> Vec<Variable
         let position = Dimension { length, ..Dimension::default() };
         let velocity = Dimension { length, time: -1, ..Dimension::default() };
         match link.coordinate {
-            Coordinate::Free { symbols, .. } => {
+            Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => {
                 positions.push(variable(symbols.position, position, VariableKind::Position, 0.0));
                 velocities.push(variable(symbols.velocity, velocity, VariableKind::Velocity, 0.0));
             }
@@ -154,7 +158,7 @@ fn state_variables(study: &Study, tree: &Tree, moving: &[usize]) -> Vec<Variable
                 }
                 velocities.push(variable(symbols.velocity[component], velocity, VariableKind::Velocity, 0.0));
             }
-            Coordinate::Prescribed { .. } | Coordinate::Weld => {}
+            Coordinate::Prescribed { .. } | Coordinate::Weld | Coordinate::Follower { .. } => {}
         }
     }
     let laws = study.states.iter().map(|state| variable(state.symbol, state.dimension, VariableKind::Law, 0.0));
@@ -236,11 +240,13 @@ fn refuse_unknown_symbols(study: &Study, tree: &Tree, system: &System) -> Result
         let law = study.states.iter().find(|state| state.symbol == symbol).map(|state| state.span);
         let joint = || {
             let link = tree.links.iter().find(|link| match link.coordinate {
-                Coordinate::Free { symbols, .. } => symbols.position == symbol || symbols.velocity == symbol,
+                Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => {
+                    symbols.position == symbol || symbols.velocity == symbol
+                }
                 Coordinate::Rotation { symbols, .. } => {
                     symbols.quaternion.contains(&symbol) || symbols.velocity.contains(&symbol)
                 }
-                Coordinate::Prescribed { .. } | Coordinate::Weld => false,
+                Coordinate::Prescribed { .. } | Coordinate::Weld | Coordinate::Follower { .. } => false,
             });
             link.map(|link| study.joints[link.joint].span)
         };

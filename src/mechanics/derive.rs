@@ -3,6 +3,7 @@
 use super::articulated::{self, Accelerated, Inertia, Wrench};
 use super::assemble::assemble;
 use super::closing::closing_coordinate;
+use super::elastic::refuse_large_modes;
 use super::forces::{self, Effect, ForceGeometry};
 use super::inertia::refuse_missing_inertia;
 use super::kinematics::{self, FrameMotion, SpatialMotion};
@@ -29,6 +30,7 @@ use std::collections::HashMap;
 /// nothing determines.
 pub fn derive(study: &Study) -> Result<System, Vec<Diagnostic>> {
     let mut graph = study.graph.clone();
+    refuse_large_modes(&mut graph, study)?;
     let tree = spanning_tree(study, &mut graph)?;
     let frames = kinematics::motion(&mut graph, &tree);
     let inertias = articulated::link_inertias(&mut graph, study, &tree);
@@ -83,7 +85,9 @@ fn kinematic_meaning(
         let (symbols, given) = match link.coordinate {
             Coordinate::Free { symbols, .. } => (symbols, None),
             Coordinate::Prescribed { symbols, motion, .. } => (symbols, Some(motion)),
-            Coordinate::Rotation { .. } | Coordinate::Weld => continue,
+            Coordinate::Rotation { .. } | Coordinate::Weld | Coordinate::Mode { .. } | Coordinate::Follower { .. } => {
+                continue;
+            }
         };
         // Only the last link of a joint carries bodies.
         let Some(&last) = tree.links_of_joint[link.joint].last() else { continue };
@@ -195,6 +199,13 @@ fn accelerate(
             }
         }
     }
+    for modal in &tree.modal {
+        for (link, load) in modal.loads(graph, study) {
+            coordinate_loads[link] = graph.add(coordinate_loads[link], load);
+        }
+        let weight = modal.weight(graph, study, &frames[modal.seat()]);
+        wrenches[modal.seat()] = wrenches[modal.seat()].add(graph, weight);
+    }
     loops.load(graph, frames, &loops.multipliers, &mut wrenches);
     articulated::articulated_bodies(graph, tree, frames, inertias, &coordinate_loads, &wrenches, study.gravity)
 }
@@ -211,13 +222,15 @@ fn add_accelerations(
     let joint_accelerations: Vec<Node> = accelerated.iter().map(|a| a.acceleration).collect();
     for (link, &acceleration) in tree.links.iter().zip(&joint_accelerations) {
         match link.coordinate {
-            Coordinate::Free { symbols, .. } | Coordinate::Prescribed { symbols, .. } => {
+            Coordinate::Free { symbols, .. }
+            | Coordinate::Prescribed { symbols, .. }
+            | Coordinate::Mode { symbols, .. } => {
                 meaning.insert(symbols.acceleration, acceleration);
             }
             Coordinate::Rotation { symbols, component } => {
                 meaning.insert(symbols.acceleration[component], acceleration);
             }
-            Coordinate::Weld => {}
+            Coordinate::Weld | Coordinate::Follower { .. } => {}
         }
     }
     let quantities: Vec<_> = study.point_quantities.iter().filter(|q| q.motion.is_acceleration()).collect();

@@ -4,7 +4,7 @@ use super::system::{StartEquation, System, VariableKind};
 use super::topology::{Tree, spanning_tree};
 use crate::diagnostics::Diagnostic;
 use crate::expression::{Graph, Node, Printer};
-use crate::study::{Attachment, AxisMotion, Force, ForcePlace, Joint, JointKind, Motion, StartBase, Study};
+use crate::study::{Attachment, AxisMotion, Elastic, Force, ForcePlace, Joint, JointKind, Motion, StartBase, Study};
 use std::fmt::Write;
 
 /// The spanning tree: ground, joints with their coordinates, bodies.
@@ -46,6 +46,8 @@ fn branches(text: &mut String, study: &Study, tree: &Tree, on: Option<usize>, de
         let note = if is_reversed { "  (declared from this body)" } else { "" };
         let mut coordinates: Vec<String> = joint.axes.iter().map(|axis| format!("{}.position", axis.name)).collect();
         coordinates.extend(joint.rotation.map(|_| format!("{}.quaternion", joint.name)));
+        let modes = study.bodies[body].elastic.iter().flat_map(|elastic| &elastic.modes);
+        coordinates.extend(modes.map(|mode| format!("{}.position", mode.name)));
         let coordinate = if coordinates.is_empty() { String::new() } else { format!("  [{}]", coordinates.join(", ")) };
         let _ = writeln!(
             text,
@@ -125,6 +127,9 @@ pub fn emit_model(study: &Study, system: &System) -> String {
         if !is_zero(&study.graph, &body.inertia) {
             let _ = writeln!(text, "  inertia {}", vector_text(&printer, &body.inertia));
         }
+        if let Some(elastic) = &body.elastic {
+            elastic_text(&mut text, &printer, elastic);
+        }
     }
     for joint in &study.joints {
         let ends = [&joint.parent, &joint.child].map(|end| attachment_text(study, &printer, end));
@@ -195,6 +200,24 @@ pub fn emit_model(study: &Study, system: &System) -> String {
         system.outputs.len()
     );
     text
+}
+
+fn elastic_text(text: &mut String, printer: &Printer, elastic: &Elastic) {
+    for (number, mode) in elastic.modes.iter().enumerate() {
+        let (frequency, damping) = (printer.text(mode.frequency), printer.text(mode.damping));
+        let _ = writeln!(text, "  {}: frequency {frequency}, damping {damping}", mode.name);
+        let _ = writeln!(text, "    takes along {}, {}", numbers_text(mode.participation), numbers_text(mode.moment));
+        for frame in elastic.frames.iter().skip(1) {
+            let shape = frame.shapes[number];
+            let (shift, turn) = (numbers_text(shape.shift), numbers_text(shape.turn));
+            let _ = writeln!(text, "    {} shifts {shift}, turns {turn}", frame.name);
+        }
+    }
+}
+
+fn numbers_text(values: [f64; 3]) -> String {
+    let [x, y, z] = values;
+    format!("({x}, {y}, {z})")
 }
 
 fn force_text(text: &mut String, study: &Study, printer: &Printer, force: &Force) {

@@ -4,11 +4,14 @@ use super::articulated::Accelerated;
 use super::topology::{Axis, Coordinate, Tree};
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::{Graph, Node, Symbol};
-use crate::study::Study;
+use crate::study::{Body, Study};
 use std::collections::HashMap;
 
 /// Below this part of the inertia in other directions, what a joint moves is rounding.
 const NEGLIGIBLE_INERTIA: f64 = 1e-12;
+
+/// Below this, kg, nothing is left of a modal mass of 1 kg: its equation is not determined.
+const LEAST_MODAL_MASS: f64 = 1e-9;
 
 /// Evaluates what each joint moves at one general configuration: zero there means zero nearly everywhere.
 pub(super) fn refuse_missing_inertia(
@@ -24,7 +27,7 @@ pub(super) fn refuse_missing_inertia(
             Axis::Shift(_) => 0.01 + 0.003 * number as f64,
         };
         match link.coordinate {
-            Coordinate::Free { symbols, .. } => {
+            Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => {
                 point.insert(symbols.position, general);
             }
             Coordinate::Rotation { symbols, component: 0 } => {
@@ -50,7 +53,12 @@ pub(super) fn refuse_missing_inertia(
         let around: [f64; 2] = std::array::from_fn(|k| around[k].max(reference[number][k]));
         let scale = if matches!(link.axis, Axis::Turn(_)) { around[0] } else { around[1] };
         let is_moving = link.free_symbols().is_none() || values[0] > NEGLIGIBLE_INERTIA * scale;
-        if !is_moving && !is_in_shadow[number] {
+        if let Coordinate::Mode { body, number: mode, .. } = link.coordinate {
+            if values[0] <= LEAST_MODAL_MASS && !is_in_shadow[number] {
+                errors.push(modes_too_large(&study.bodies[body], mode));
+                is_in_shadow[number] = true;
+            }
+        } else if !is_moving && !is_in_shadow[number] {
             errors.push(no_inertia(study, tree, link.joint, link.axis));
         }
         if let Some(p) = link.predecessor {
@@ -60,6 +68,15 @@ pub(super) fn refuse_missing_inertia(
     }
     errors.reverse();
     if errors.is_empty() { Ok(()) } else { Err(errors) }
+}
+
+pub(super) fn modes_too_large(body: &Body, mode: usize) -> Diagnostic {
+    let message = format!("the modes of `{}` take along more than its mass and inertia", body.name);
+    let span = body.elastic.as_ref().map_or(body.span, |elastic| elastic.span);
+    Diagnostic::error(Code::MODE_NORMALISATION, message)
+        .label(span, format!("mode {} with those before it", mode + 1))
+        .secondary(body.span, "this body")
+        .help("scale every mode to a modal mass of 1 kg; check `mass` and `inertia` of the body")
 }
 
 fn no_inertia(study: &Study, tree: &Tree, joint: usize, axis: Axis) -> Diagnostic {

@@ -47,11 +47,14 @@ fn relative_placement(graph: &mut Graph, link: &Link) -> (Matrix, Vector) {
     let position = match link.coordinate {
         Coordinate::Free { symbols, .. } => graph.variable(symbols.position),
         Coordinate::Prescribed { motion, .. } => motion[0],
+        Coordinate::Follower { position, .. } => position,
         Coordinate::Rotation { symbols, component: 0 } => {
             let quaternion = symbols.quaternion.map(|symbol| graph.variable(symbol));
             return (vector::rotation_of_quaternion(graph, quaternion), vector::zero(graph));
         }
-        Coordinate::Rotation { .. } | Coordinate::Weld => return (vector::identity(graph), vector::zero(graph)),
+        Coordinate::Rotation { .. } | Coordinate::Weld | Coordinate::Mode { .. } => {
+            return (vector::identity(graph), vector::zero(graph));
+        }
     };
     match link.axis {
         Axis::Turn(axis) => (vector::rotation(graph, axis, position), vector::zero(graph)),
@@ -65,8 +68,8 @@ fn rate_in_bias(graph: &mut Graph, link: &Link) -> (Vector, Vector) {
     let zero = vector::zero(graph);
     match link.coordinate {
         Coordinate::Rotation { symbols, component: 0 } => (symbols.velocity.map(|s| graph.variable(s)), zero),
-        Coordinate::Rotation { .. } | Coordinate::Weld => (zero, zero),
-        Coordinate::Free { .. } | Coordinate::Prescribed { .. } => {
+        Coordinate::Rotation { .. } | Coordinate::Weld | Coordinate::Mode { .. } => (zero, zero),
+        Coordinate::Free { .. } | Coordinate::Prescribed { .. } | Coordinate::Follower { .. } => {
             let rate = link.rate(graph);
             let (turning, shifting) = motion_axis(graph, link.axis);
             (vector::scale(graph, rate, turning), vector::scale(graph, rate, shifting))

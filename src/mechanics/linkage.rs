@@ -38,6 +38,8 @@ struct Freedom {
     rate: Symbol,
     change: Change,
     is_turn: bool,
+    /// A modal coordinate: deformation closes a loop only where rigid motion cannot.
+    is_elastic: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -66,19 +68,20 @@ impl Linkage {
         for link in &tree.links {
             let is_turn = matches!(link.axis, Axis::Turn(_));
             match link.coordinate {
-                Coordinate::Free { symbols, .. } => {
+                Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => {
+                    let is_elastic = matches!(link.coordinate, Coordinate::Mode { .. });
                     let change = Change::Coordinate(symbols.position);
-                    freedoms.push(Freedom { rate: symbols.velocity, change, is_turn });
+                    freedoms.push(Freedom { rate: symbols.velocity, change, is_turn, is_elastic });
                     values.insert(symbols.position, 0.0);
                 }
                 Coordinate::Rotation { symbols, component } => {
                     let change = Change::Quaternion(symbols.quaternion, component);
-                    freedoms.push(Freedom { rate: symbols.velocity[component], change, is_turn });
+                    freedoms.push(Freedom { rate: symbols.velocity[component], change, is_turn, is_elastic: false });
                     symbols.quaternion.iter().enumerate().for_each(|(i, &s)| {
                         values.insert(s, f64::from(u8::from(i == 0)));
                     });
                 }
-                Coordinate::Prescribed { .. } | Coordinate::Weld => {}
+                Coordinate::Prescribed { .. } | Coordinate::Weld | Coordinate::Follower { .. } => {}
             }
         }
         let (positions, velocities, upright) = (positions.to_vec(), velocities.to_vec(), upright.to_vec());
@@ -111,8 +114,8 @@ impl Linkage {
         self.values.extend(given);
         self.normalise();
         let start = self.values.clone();
-        let unstated: Vec<usize> =
-            (0..self.freedoms.len()).filter(|&i| !self.freedoms[i].change.touches(given)).collect();
+        let is_unstated = |freedom: &Freedom| !freedom.is_elastic && !freedom.change.touches(given);
+        let unstated: Vec<usize> = (0..self.freedoms.len()).filter(|&i| is_unstated(&self.freedoms[i])).collect();
         let all: Vec<usize> = (0..self.freedoms.len()).collect();
         let mut outcome = self.close(&unstated);
         if outcome.is_err() {

@@ -5,7 +5,7 @@
 //!
 //! A joint is a list of motion axes; every axis is one link of the spanning tree (`topology`). Motion goes outwards
 //! (`kinematics`), forces come from the elements (`forces`), accelerations from the articulated-body algorithm
-//! (`articulated`), all on symbolic scalars, so that whatever is structurally zero vanishes. Joints that close loops are rows of
+//! (`articulated`, with modes of elastic bodies `elastic` and `modal_pass`), all on symbolic scalars, so that whatever is structurally zero vanishes. Joints that close loops are rows of
 //! constraints (`loops`), of which those count that are independent near the start (`assembly`, in numbers `linkage`), with two multipliers each
 //! (`multipliers`); what joints transmit follows from the same pass (`reactions`).
 
@@ -14,6 +14,7 @@ mod assemble;
 mod assembly;
 mod closing;
 mod derive;
+mod elastic;
 mod emit;
 mod emit_latex;
 mod forces;
@@ -21,6 +22,7 @@ mod inertia;
 mod kinematics;
 mod linkage;
 mod loops;
+mod modal_pass;
 mod multipliers;
 mod reactions;
 mod scale;

@@ -6,7 +6,7 @@ use super::kinematics::{self, FrameMotion};
 use super::loops::{self, Direction, Row};
 use super::scale::typical_magnitude;
 use super::system::{Variable, VariableKind};
-use super::topology::Tree;
+use super::topology::{Coordinate, Tree};
 use crate::diagnostics::Diagnostic;
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::Dimension;
@@ -78,7 +78,15 @@ impl Loops {
         let mut result = vec![zero; tree.links.len()];
         for (i, link) in tree.links.iter().enumerate().rev() {
             let axis = kinematics::motion_axis(graph, link.axis);
-            result[i] = wrenches[i].on(graph, axis);
+            let own = wrenches[i].on(graph, axis);
+            if let Coordinate::Follower { weights, .. } = link.coordinate {
+                for &(mode, weight) in &tree.weights[weights] {
+                    let share = graph.multiply(weight, own);
+                    result[mode] = graph.add(result[mode], share);
+                }
+            } else {
+                result[i] = graph.add(result[i], own);
+            }
             if let Some(p) = link.predecessor {
                 let carried = wrenches[i].carried_back(graph, &frames[i]);
                 wrenches[p] = wrenches[p].add(graph, carried);

@@ -1,9 +1,10 @@
 //! The spanning tree: which joint carries which body.
 
+use super::elastic::{self, Modal};
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::vector::{self, Matrix, Vector};
 use crate::expression::{Graph, Node, Symbol};
-use crate::study::{Attachment, AxisMotion, Joint, JointSymbols, RotationSymbols, Study};
+use crate::study::{Attachment, AxisMotion, ForcePlace, Joint, JointSymbols, RotationSymbols, Study};
 use std::collections::VecDeque;
 
 /// One single motion: a frame that shifts along or turns about a constant axis relative to its predecessor. A joint with
@@ -40,24 +41,31 @@ pub(super) enum Coordinate {
     Rotation { symbols: RotationSymbols, component: usize },
     /// No motion; only there because what it transmits is asked for.
     Weld,
+    /// The coordinate of a mode of an elastic body. The frame does not move by it; frames of the body follow.
+    Mode { symbols: JointSymbols, body: usize, number: usize },
+    /// A frame of an elastic body: a sum of modal coordinates, with index into [`Tree::weights`].
+    Follower { position: Node, velocity: Node, weights: usize },
 }
 
 impl Link {
     /// Symbols of velocity and acceleration, where the motion is free.
     pub fn free_symbols(&self) -> Option<(Symbol, Symbol)> {
         match self.coordinate {
-            Coordinate::Free { symbols, .. } => Some((symbols.velocity, symbols.acceleration)),
+            Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => {
+                Some((symbols.velocity, symbols.acceleration))
+            }
             Coordinate::Rotation { symbols, component } => {
                 Some((symbols.velocity[component], symbols.acceleration[component]))
             }
-            Coordinate::Prescribed { .. } | Coordinate::Weld => None,
+            Coordinate::Prescribed { .. } | Coordinate::Weld | Coordinate::Follower { .. } => None,
         }
     }
 
     /// Rate of the coordinate (component of the relative velocity).
     pub fn rate(&self, graph: &mut Graph) -> Node {
         match self.coordinate {
-            Coordinate::Free { symbols, .. } => graph.variable(symbols.velocity),
+            Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => graph.variable(symbols.velocity),
+            Coordinate::Follower { velocity, .. } => velocity,
             Coordinate::Rotation { symbols, component } => graph.variable(symbols.velocity[component]),
             Coordinate::Prescribed { motion, .. } => motion[1],
             Coordinate::Weld => graph.constant(0.0),
@@ -79,6 +87,13 @@ pub(super) struct Tree {
     pub links: Vec<Link>,
     /// Per body of the study.
     pub seats: Vec<Seat>,
+    /// Per body: where it sits undeformed.
+    pub undeformed: Vec<Seat>,
+    /// Per body, per frame of an elastic one: where it is, if anything stands on it.
+    pub frames: Vec<Vec<Option<Seat>>>,
+    pub modal: Vec<Modal>,
+    /// Links of modes with their weights, per frame's coordinate.
+    pub weights: Vec<Vec<(usize, Node)>>,
     /// Per joint of the study; empty for fixed joints and those that close loops.
     pub links_of_joint: Vec<Vec<usize>>,
     /// Joints in the order of the walk, with the body each carries.
@@ -88,6 +103,10 @@ pub(super) struct Tree {
 impl Tree {
     /// The frame and the position in it of a point of the study.
     pub fn place(&self, graph: &mut Graph, point: &Attachment) -> Seat {
+        let frames = point.body.and_then(|body| self.frames.get(body));
+        if let Some(Some(seat)) = point.frame.and_then(|frame| frames?.get(frame)) {
+            return *seat;
+        }
         let seat = self.seat(graph, point.body);
         let turned = vector::apply(graph, seat.rotation, point.position);
         Seat { offset: vector::add(graph, seat.offset, turned), ..seat }
@@ -129,8 +148,17 @@ pub(super) fn spanning_tree(study: &Study, graph: &mut Graph) -> Result<Tree, Ve
     }
     let mut seats: Vec<Option<Seat>> = vec![None; ground + 1];
     seats[ground] = Some(ground_seat(graph));
-    let mut tree =
-        Tree { links: vec![], seats: vec![], links_of_joint: vec![vec![]; study.joints.len()], walk: vec![] };
+    let mut tree = Tree {
+        links: vec![],
+        seats: vec![],
+        undeformed: vec![ground_seat(graph); study.bodies.len()],
+        frames: vec![vec![]; study.bodies.len()],
+        modal: vec![],
+        weights: vec![],
+        links_of_joint: vec![vec![]; study.joints.len()],
+        walk: vec![],
+    };
+    let used = used_frames(study);
     let mut queue = VecDeque::from([ground]);
     while let Some(from) = queue.pop_front() {
         for &number in &joints_at[from] {
@@ -139,7 +167,11 @@ pub(super) fn spanning_tree(study: &Study, graph: &mut Graph) -> Result<Tree, Ve
             let to = if is_reversed { index(&joint.parent) } else { index(&joint.child) };
             let (Some(seat), None) = (seats[from], seats[to]) else { continue };
             let is_asked = study.reactions.iter().any(|reaction| reaction.joint == number);
-            seats[to] = Some(tree.attach(graph, study, (number, joint), (is_reversed, is_asked), seat, to));
+            let far = if is_reversed { &joint.parent } else { &joint.child };
+            let near = if is_reversed { &joint.child } else { &joint.parent };
+            let seat = tree.place_from(graph, seat, near);
+            let base = tree.attach(graph, study, (number, joint), (is_reversed, is_asked), seat, (to, far));
+            seats[to] = Some(tree.settle(graph, study, number, base, (to, far), &used[to]));
             queue.push_back(to);
         }
     }
@@ -157,23 +189,82 @@ pub(super) fn spanning_tree(study: &Study, graph: &mut Graph) -> Result<Tree, Ve
     if errors.is_empty() { Ok(tree) } else { Err(errors) }
 }
 
+/// Per body, per frame of an elastic one: something stands on it. The body itself always counts.
+fn used_frames(study: &Study) -> Vec<Vec<bool>> {
+    let frames = |body: &crate::study::Body| body.elastic.as_ref().map_or(0, |elastic| elastic.frames.len());
+    let mut used: Vec<Vec<bool>> =
+        study.bodies.iter().map(|body| (0..frames(body)).map(|frame| frame == 0).collect()).collect();
+    let mut mark = |end: &Attachment| {
+        if let (Some(body), Some(frame)) = (end.body, end.frame)
+            && let Some(slot) = used[body].get_mut(frame)
+        {
+            *slot = true;
+        }
+    };
+    study.joints.iter().for_each(|joint| [&joint.parent, &joint.child].into_iter().for_each(&mut mark));
+    for force in &study.forces {
+        if let ForcePlace::Between { first, second, .. } = &force.place {
+            mark(first);
+            mark(second);
+        }
+    }
+    study.point_quantities.iter().for_each(|quantity| mark(&quantity.point));
+    used
+}
+
 impl Tree {
-    /// Adds what `joint` carries; returns where body `to` sits.
+    /// The frame and position of a joint's near end, whose body sits at `seat`.
+    fn place_from(&self, graph: &mut Graph, seat: Seat, near: &Attachment) -> Seat {
+        let frames = near.body.map_or(&[][..], |body| &self.frames[body][..]);
+        if let Some(Some(seat)) = near.frame.and_then(|frame| frames.get(frame)) {
+            return *seat;
+        }
+        let turned = vector::apply(graph, seat.rotation, near.position);
+        Seat { offset: vector::add(graph, seat.offset, turned), ..seat }
+    }
+
+    /// Where body `to` is, given its undeformed seat on the joint that carries it at `far`.
+    fn settle(
+        &mut self,
+        graph: &mut Graph,
+        study: &Study,
+        joint: usize,
+        base: Seat,
+        (to, far): (usize, &Attachment),
+        used: &[bool],
+    ) -> Seat {
+        let Some(body_elastic) = study.bodies[to].elastic.as_ref() else {
+            if let Some(link) = base.link {
+                self.links[link].bodies.push(to);
+            }
+            self.undeformed[to] = base;
+            return base;
+        };
+        let carried_at = far.frame.unwrap_or_default();
+        let seats = elastic::attach(graph, self, (study, to, joint), body_elastic, (base, carried_at), used);
+        if let Some(link) = seats.undeformed.link {
+            self.links[link].bodies.push(to);
+        }
+        self.undeformed[to] = seats.undeformed;
+        let own = seats.frames.first().copied().flatten().unwrap_or(seats.undeformed);
+        self.frames[to] = seats.frames;
+        own
+    }
+
+    /// Adds the motions of `joint`, whose near end is at `place`; returns where body `to` sits.
     fn attach(
         &mut self,
         graph: &mut Graph,
         study: &Study,
         (number, joint): (usize, &Joint),
         (is_reversed, is_asked): (bool, bool),
-        seat: Seat,
-        to: usize,
+        place: Seat,
+        (to, far): (usize, &Attachment),
     ) -> Seat {
-        let (near, far) = if is_reversed { (&joint.child, &joint.parent) } else { (&joint.parent, &joint.child) };
         self.walk.push((number, to));
-        let (parent_rotation, rotation) = rotations(graph, joint, is_reversed, seat.rotation);
-        let mut frame = seat.link;
-        let turned = vector::apply(graph, seat.rotation, near.position);
-        let mut offset = vector::add(graph, seat.offset, turned);
+        let (parent_rotation, rotation) = rotations(graph, joint, is_reversed, place.rotation);
+        let mut frame = place.link;
+        let mut offset = place.offset;
         let mut motions = motions(graph, study, joint, is_reversed, parent_rotation);
         if motions.is_empty() && is_asked {
             motions.push((Axis::Turn(vector::zero(graph)), Coordinate::Weld));
@@ -183,9 +274,6 @@ impl Tree {
             frame = Some(self.links.len() - 1);
             self.links_of_joint[number].push(self.links.len() - 1);
             offset = vector::zero(graph);
-        }
-        if let Some(link) = frame {
-            self.links[link].bodies.push(to);
         }
         let arm = vector::apply(graph, rotation, far.position);
         Seat { link: frame, offset: vector::subtract(graph, offset, arm), rotation }

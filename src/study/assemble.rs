@@ -232,6 +232,8 @@ impl<'a> Checker<'a> {
         let mut roots: Vec<Node> = gravity.to_vec();
         for (index, body) in self.bodies.iter().enumerate() {
             roots.push(body.mass);
+            let modes = body.elastic.iter().flat_map(|elastic| &elastic.modes);
+            roots.extend(modes.flat_map(|mode| [mode.frequency, mode.damping]));
             if self.topology.turns(index) {
                 roots.extend(body.inertia);
                 roots.extend(body.centre_of_gravity);

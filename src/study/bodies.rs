@@ -24,9 +24,11 @@ impl<'a> Checker<'a> {
             self.known_fields("`ground`", ground.fields, &[]);
             self.ground_points = self.points("ground", ground.points);
         }
-        for body in &declared.bodies {
+        for (index, body) in declared.bodies.iter().enumerate() {
             let name = &body.name.text;
-            self.known_fields(&format!("body `{name}`"), body.fields, &["mass", "centre_of_gravity", "inertia"]);
+            let known =
+                ["mass", "centre_of_gravity", "inertia", "modes", "frequency_scale", "damping_ratio", "mode_count"];
+            self.known_fields(&format!("body `{name}`"), body.fields, &known);
             let zero = self.graph.constant(0.0);
             let centre_of_gravity = match find(body.fields, "centre_of_gravity") {
                 Some(field) => self.vector(&format!("{name}.centre_of_gravity"), field).unwrap_or([zero; 3]),
@@ -35,7 +37,16 @@ impl<'a> Checker<'a> {
             let points = self.points(name, body.points);
             let span = body.name.span;
             let inertia = [zero; 6];
-            self.bodies.push(Body { name: name.clone(), mass: zero, centre_of_gravity, inertia, points, span });
+            let elastic = self.elastic(index, &points);
+            self.bodies.push(Body {
+                name: name.clone(),
+                mass: zero,
+                centre_of_gravity,
+                inertia,
+                points,
+                elastic,
+                span,
+            });
         }
         for index in 0..declared.bodies.len() {
             // A mass that could not be found is not zero.
@@ -295,7 +306,8 @@ impl<'a> Checker<'a> {
             }
             (None, None) => None,
         };
-        Attachment { body: end.body, position: position.unwrap_or([zero; 3]) }
+        let frame = end.body.and_then(|body| self.frame_of(body, end.point, end.span));
+        Attachment { body: end.body, position: position.unwrap_or([zero; 3]), frame }
     }
 
     /// Position of an attachment in ground axes in the reference configuration.

@@ -265,6 +265,14 @@ impl<'a> Checker<'a> {
                 return Some((*symbol, Dimension::ONE / Dimension::TIME));
             }
         }
+        let mut modes = self.bodies.iter().filter_map(|body| body.elastic.as_ref()).flat_map(|elastic| &elastic.modes);
+        if let Some(mode) = modes.find(|mode| mode.name == owner) {
+            return match quantity {
+                "position" => Some((mode.symbols.position, Dimension::LENGTH)),
+                "velocity" => Some((mode.symbols.velocity, Dimension::VELOCITY)),
+                _ => None,
+            };
+        }
         let state = self.states.iter().find(|state| state.name == path)?;
         Some((state.symbol, state.dimension))
     }

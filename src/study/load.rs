@@ -1,7 +1,7 @@
 //! The texts of a study: the prelude, its file, the files it uses.
 
 use crate::diagnostics::{Code, Diagnostic, Sources, Span};
-use crate::syntax::{ItemKind, Tree, Value, parse};
+use crate::syntax::{Change, Item, ItemKind, ModelDeclaration, Tree, Value, parse};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
@@ -26,7 +26,7 @@ pub struct Loaded {
     pub directory: PathBuf,
     /// One per source.
     trees: Vec<Arc<Tree>>,
-    /// Texts of the files that tables name, or why they cannot be read; by index of the study file and path as written.
+    /// Texts of the files that tables and elastic bodies name, or why they cannot be read; by index of the study file and path as written.
     table_texts: BTreeMap<(u32, String), Result<Arc<str>, String>>,
 }
 
@@ -82,7 +82,7 @@ impl Loaded {
         PRELUDE.len() as u32
     }
 
-    /// The text of a file that a table of study file `file` names.
+    /// The text of a file that a table or elastic body of study file `file` names.
     pub(super) fn table_text(&self, file: u32, path: &str) -> Option<&Result<Arc<str>, String>> {
         self.table_texts.get(&(file, path.to_owned()))
     }
@@ -125,15 +125,33 @@ impl Loaded {
         for item in &tree.items {
             match &item.kind {
                 ItemKind::Use { path } => self.append_file(&directory.join(&path.text), Some(path.span), seen),
-                ItemKind::Table(table) => {
-                    for field in table.fields.iter().filter(|field| field.key.text == "file") {
-                        if let Value::Text(path) = &field.value {
-                            let text = read_table(&directory.join(&path.text));
-                            self.table_texts.insert((file, path.text.clone()), text);
-                        }
+                _ => self.read_files_of(file, directory, item),
+            }
+        }
+    }
+
+    /// Reads the files that tables and elastic bodies name, also those of models, families and variants.
+    fn read_files_of(&mut self, file: u32, directory: &Path, item: &Item) {
+        let (fields, key) = match &item.kind {
+            ItemKind::Table(table) => (&table.fields, "file"),
+            ItemKind::Body { fields, .. } => (fields, "modes"),
+            ItemKind::Model(ModelDeclaration { items, .. }) | ItemKind::Family { items, .. } => {
+                return items.iter().for_each(|item| self.read_files_of(file, directory, item));
+            }
+            ItemKind::Variant { changes, .. } => {
+                for change in changes {
+                    if let Change::Add(item) | Change::Replace(item) = change {
+                        self.read_files_of(file, directory, item);
                     }
                 }
-                _ => {}
+                return;
+            }
+            _ => return,
+        };
+        for field in fields.iter().filter(|field| field.key.text == key) {
+            if let Value::Text(path) = &field.value {
+                let text = read_table(&directory.join(&path.text));
+                self.table_texts.insert((file, path.text.clone()), text);
             }
         }
     }

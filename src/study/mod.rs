@@ -12,6 +12,7 @@ mod checker;
 mod declarations;
 mod effects;
 mod elaborate;
+mod elastic;
 mod elements;
 mod evaluate;
 mod experiments;
@@ -24,6 +25,7 @@ mod kinds;
 mod load;
 mod manoeuvres;
 mod model;
+mod modes;
 mod names;
 mod nuisance;
 mod parts;
@@ -35,6 +37,7 @@ mod topology;
 mod trial;
 mod units;
 
+pub use elastic::{Elastic, ElasticFrame, Mode, ModeShape};
 pub use load::{Loaded, load, load_text};
 pub use model::*;
 

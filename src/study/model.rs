@@ -1,5 +1,6 @@
 //! The checked study. All numbers are SI; all expressions are nodes of [`Study::graph`].
 
+use super::elastic::Elastic;
 use crate::diagnostics::Span;
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::{Dimension, Unit};
@@ -134,6 +135,8 @@ pub struct Body {
     /// inertia with the tensor's sign, I_xy = -int x y dm), kg m^2.
     pub inertia: [Node; 6],
     pub points: Vec<Point>,
+    /// Its deformation; `None`: rigid.
+    pub elastic: Option<Elastic>,
     pub span: Span,
 }
 
@@ -149,6 +152,8 @@ pub struct Point {
 pub struct Attachment {
     pub body: Option<usize>,
     pub position: [Node; 3],
+    /// On an elastic body: index into [`Elastic::frames`].
+    pub frame: Option<usize>,
 }
 
 /// A joint. In the reference configuration (all coordinates zero) the two attachments coincide and the bodies' axes are

@@ -247,6 +247,10 @@ impl<'a> Checker<'a> {
         if path == "mass" {
             return self.body_mass(index);
         }
+        if let Some(value) = self.mode_quantity(index, name, allowed) {
+            return value;
+        }
+        let is_elastic = self.bodies.get(index).is_some_and(|body| body.elastic.is_some());
         let parts: Vec<&str> = path.split('.').collect();
         let (point, motion, axis) = match parts.as_slice() {
             [motion, axis] => (None, *motion, *axis),
@@ -257,11 +261,11 @@ impl<'a> Checker<'a> {
             "position" => PointMotion::Position,
             "velocity" => PointMotion::Velocity,
             "acceleration" => PointMotion::Acceleration,
-            "angular_velocity" if point.is_none() => PointMotion::AngularVelocity,
-            "angular_acceleration" if point.is_none() => PointMotion::AngularAcceleration,
-            "axis_x" if point.is_none() => PointMotion::Axis(0),
-            "axis_y" if point.is_none() => PointMotion::Axis(1),
-            "axis_z" if point.is_none() => PointMotion::Axis(2),
+            "angular_velocity" if point.is_none() || is_elastic => PointMotion::AngularVelocity,
+            "angular_acceleration" if point.is_none() || is_elastic => PointMotion::AngularAcceleration,
+            "axis_x" if point.is_none() || is_elastic => PointMotion::Axis(0),
+            "axis_y" if point.is_none() || is_elastic => PointMotion::Axis(1),
+            "axis_z" if point.is_none() || is_elastic => PointMotion::Axis(2),
             _ => return self.unknown_body_quantity(index, name),
         };
         let Some(axis) = ["x", "y", "z"].iter().position(|letter| *letter == axis) else {
@@ -269,8 +273,24 @@ impl<'a> Checker<'a> {
         };
         self.check_varies(name, allowed)?;
         let Some(position) = self.point_of(index, point) else { return self.unknown_body_quantity(index, name) };
-        let value = self.point_quantity(&name.text, Attachment { body: Some(index), position }, motion, axis);
+        let frame = if is_elastic { Some(self.frame_of(index, point, name.span)?) } else { None };
+        let value = self.point_quantity(&name.text, Attachment { body: Some(index), position, frame }, motion, axis);
         self.check_accelerations(value, name, allowed)
+    }
+
+    /// `BODY.mode_1.position` of an elastic body; the outer `None`: it is no mode.
+    fn mode_quantity(&mut self, index: usize, name: &'a Name, allowed: Allowed) -> Option<Option<Typed>> {
+        let modes = &self.bodies.get(index)?.elastic.as_ref()?.modes;
+        let (owner, quantity) = name.text.rsplit_once('.')?;
+        let symbols = modes.iter().find(|mode| mode.name == owner)?.symbols;
+        let (symbol, dimension) = match quantity {
+            "position" => (symbols.position, Dimension::LENGTH),
+            "velocity" => (symbols.velocity, Dimension::VELOCITY),
+            "acceleration" => (symbols.acceleration, Dimension::ACCELERATION),
+            _ => return None,
+        };
+        let value = Typed::new(self.graph.variable(symbol), dimension);
+        Some(self.check_varies(name, allowed).and_then(|()| self.check_accelerations(value, name, allowed)))
     }
 
     fn point_quantity(&mut self, text: &str, point: Attachment, motion: PointMotion, axis: usize) -> Typed {

@@ -4,7 +4,7 @@ use super::checker::{Allowed, Checker, Scope};
 use super::fields::find;
 use super::joints::JointFreedom;
 use super::model::{AxisMotion, JointKind};
-use crate::diagnostics::{Code, Diagnostic, similar_name};
+use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use crate::syntax::{ElementPlace, Name};
 use std::collections::VecDeque;
 
@@ -15,6 +15,7 @@ const SCOPE: Scope = Scope::Study(Allowed::Number);
 pub(super) struct End<'a> {
     pub body: Option<usize>,
     pub point: Option<&'a str>,
+    pub span: Span,
 }
 
 /// A joint as far as it could be read.
@@ -41,6 +42,8 @@ pub(super) struct Topology<'a> {
     pub closes_loop: Vec<bool>,
     pub carrier: Vec<Option<usize>>,
     pub order: Vec<usize>,
+    /// Per body: it has modes.
+    pub is_elastic: Vec<bool>,
 }
 
 impl<'a> Topology<'a> {
@@ -62,9 +65,16 @@ impl<'a> Topology<'a> {
         chain
     }
 
-    /// Whether a joint turns this body.
+    /// Whether a joint or an elastic body turns this body.
     pub fn turns(&self, body: usize) -> bool {
-        self.chain(Some(body)).into_iter().any(|joint| self.joint(joint).is_none_or(|read| read.freedom.turns()))
+        let is_elastic = |body: usize| self.is_elastic.get(body).copied().unwrap_or(false);
+        let turns = |joint: usize| {
+            self.joint(joint).is_none_or(|read| {
+                let carriers = [read.parent.body, read.child.body];
+                read.freedom.turns() || carriers.into_iter().flatten().any(is_elastic)
+            })
+        };
+        is_elastic(body) || self.chain(Some(body)).into_iter().any(turns)
     }
 
     /// The axis along which two bodies can only shift against each other, if there is one: no joint turns them, and
@@ -100,6 +110,8 @@ pub(super) fn is_parallel(a: [f64; 3], b: [f64; 3]) -> bool {
 impl<'a> Checker<'a> {
     /// Reads all joints, chooses the spanning tree and checks that it reaches every body.
     pub fn read_topology(&mut self) {
+        self.topology.is_elastic =
+            self.declared.bodies.iter().map(|body| find(body.fields, "modes").is_some()).collect();
         for index in 0..self.declared.joints.len() {
             let declared = &self.declared.joints[index];
             let owner = format!("joint `{}`", declared.name.text);
@@ -177,7 +189,7 @@ impl<'a> Checker<'a> {
                 return self.fail(diagnostic, SCOPE);
             }
         }
-        Some(End { body, point })
+        Some(End { body, point, span: name.span })
     }
 
     /// Joints with prescribed motion come first, then those that have no form as constraints, then those that carry elements,

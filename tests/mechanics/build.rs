@@ -113,13 +113,14 @@ impl Builder {
             centre_of_gravity,
             inertia,
             points: vec![],
+            elastic: None,
             span: Span::default(),
         });
         self.study.bodies.len() - 1
     }
 
     pub fn attach(&mut self, body: Option<usize>, position: [f64; 3]) -> Attachment {
-        Attachment { body, position: self.vector(position) }
+        Attachment { body, position: self.vector(position), frame: None }
     }
 
     pub fn joint(&mut self, name: &str, motion: Option<AxisMotion>, parent: Attachment, child: Attachment) -> usize {

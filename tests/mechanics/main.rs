@@ -3,8 +3,10 @@
 mod build;
 mod cases;
 mod derivatives;
+mod elastic;
 mod faults;
 mod maximal;
 mod pendulum;
+mod run;
 mod spatial;
 mod text;

@@ -278,7 +278,7 @@ fn joints_come_out_parents_first_and_points_are_quantities() {
     assert_eq!(study.point_quantities.len(), 2);
     let quantity = &study.point_quantities[0];
     assert_eq!((quantity.motion, quantity.axis), (PointMotion::Velocity, 0));
-    let Attachment { body, position } = quantity.point;
+    let Attachment { body, position, .. } = quantity.point;
     assert_eq!(body, Some(0));
     close(value(&study, position[2], &[]), 0.4);
     close(value(&study, study.gravity[2], &[]), -9.81);
