@@ -19,7 +19,6 @@ pub fn checked(text: &str, files: &[(&str, String)]) -> Result<Study, String> {
     check(&loaded, None).map(|checked| checked.study).map_err(told)
 }
 
-
 /// All measures of every manoeuvre, in order.
 pub fn run(text: &str, files: &[(&str, String)]) -> Vec<Channels> {
     let study = checked(text, files).unwrap_or_else(|findings| panic!("{findings}"));
