@@ -339,6 +339,21 @@ codes! {
      file of modes has the columns `tip.shift_x`, `tip.shift_y`, `tip.shift_z`, `tip.turn_x [rad/m]`, `tip.turn_y [rad/m]`, `tip.turn_z [rad/m]`\n\
      (zeros where a mode does not move it). The body by itself (`beam`) is the undeformed frame in which the modes are given.\n"
 
+    EVENT_CONDITION "E0258" "condition of an event"
+    "An event happens at the instant at which its condition becomes true, found as the zero of a function. That needs\n\
+     comparisons of quantities that change, joined by `and` and `or`.\n\
+     Write the comparison itself: `when x < 0 mm and v < 0 m/s { .. }`.\n"
+
+    EVENT_PERIOD "E0259" "period of an event"
+    "`every PERIOD { .. }` acts at all multiples of a time that is known before the simulation: a positive number with a\n\
+     unit of time. It can neither be identified nor change.\n\
+     Write `every 1 ms { .. }`, or bind the law's parameter to a number.\n"
+
+    EVENT_TARGET "E0262" "not changed by events"
+    "An event changes states of its own law, and at a joint or force element the rate `v` (by an impulse along the element).\n\
+     Positions follow from rates; ports and parameters are given from outside.\n\
+     Declare a state and change that: `state z: coordinate from 0 m`, `when x < 0 m { z := x }`.\n"
+
     // ---- E03xx: mechanics ----
 
     UNCONNECTED_BODY "E0301" "body is not connected to ground"
@@ -402,6 +417,11 @@ codes! {
      inertia, and all modes together take no more than there is. Otherwise no body has these modes: the shapes are scaled otherwise\n\
      (to a largest deflection of 1, or for other units), or `mass` and `inertia` of the body do not belong to them.\n\
      Divide every shape by the root of its modal mass in kg.\n"
+
+    IMPACT_IN_LOOP "E0312" "impulse in a mechanism with loops"
+    "An event that changes the rate of a force element does so by an impulse. In a mechanism with closed loops the closing\n\
+     joints would answer with impulses of their own, which are not computed.\n\
+     Model the contact as a stiff spring with damping, `force stop: spring on motor { stiffness = 1 MN*m/rad }`, or open the loop.\n"
 
     // ---- E04xx: data files and signals ----
 

@@ -92,8 +92,14 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
         self.dynamics.jacobian(t.min(self.last_time), y, y_prime, c, &mut self.jacobian);
     }
 
-    /// `-(dF/dy' V + dF/dtheta)` into `result` (n x p row by row). `self.jacobian` must hold the values at this point
-    /// for `c`, which must not be zero.
+    /// Values of the expanded matrix ([`Dynamics::expanded_jacobian`]).
+    pub fn linearise_expanded(&mut self, t: f64, y: &[f64], c: f64, scale: &[f64], values: &mut [f64]) {
+        self.work.jacobians += 1;
+        self.dynamics.expanded_jacobian(t.min(self.last_time), y, c, scale, values);
+    }
+
+    /// `-(dF/dy' V + dF/dtheta)` into `result` (n x p row by row). Where derivatives have factors of their own, `self.jacobian` must
+    /// hold the values at this point for `c`, which must not be zero.
     pub fn sensitivity_right_hand_side(
         &mut self,
         t: f64,
@@ -104,9 +110,11 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
         result: &mut [f64],
     ) {
         let t = t.min(self.last_time);
-        if self.explicit {
-            for (r, v) in result.iter_mut().zip(v) {
-                *r = -v;
+        if self.explicit || self.structure.has_unit_mass {
+            let rows = result.chunks_exact_mut(self.p).zip(v.chunks_exact(self.p));
+            for ((result, v), differential) in rows.zip(self.dynamics.differential()) {
+                let sign = if *differential { -1.0 } else { 0.0 };
+                result.iter_mut().zip(v).for_each(|(r, v)| *r = sign * v);
             }
         } else {
             self.dynamics.jacobian(t, y, y_prime, 0.0, &mut self.mass);

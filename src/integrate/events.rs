@@ -52,6 +52,10 @@ impl Events {
         }
     }
 
+    pub fn has_switches(&self) -> bool {
+        !self.signs.is_empty()
+    }
+
     /// Takes the signs at a start; those of zeros from their slopes.
     pub fn begin<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, t: f64, z: &[f64], y_prime: &[f64]) {
         system.dynamics.switches(t, &z[..system.n], &mut self.values);
@@ -76,8 +80,16 @@ impl Events {
             let right = if point > INNER_POINTS { to } else { from + (to - from) * point as f64 / 4.0 };
             interpolate(right, &mut self.z);
             system.dynamics.switches(right, &self.z[..system.n], &mut self.values);
-            let crossed: Vec<usize> =
-                (0..self.values.len()).filter(|&k| sign(self.values[k]) * self.signs[k] < 0.0).collect();
+            let mut crossed = Vec::new();
+            for k in 0..self.values.len() {
+                if sign(self.values[k]) * self.signs[k] < 0.0 {
+                    if system.dynamics.switch_acts(k, self.signs[k] < 0.0) {
+                        crossed.push(k);
+                    } else {
+                        self.signs[k] = sign(self.values[k]);
+                    }
+                }
+            }
             let events = crossed.into_iter().map(|switch| {
                 let time = self.locate(system, switch, left, right, &interpolate);
                 Event { time, switch }
@@ -143,21 +155,21 @@ impl Events {
     ) -> Result<(), Refusal> {
         let Event { time, switch } = event;
         self.refuse_accumulation(system, event)?;
-        let n = system.n;
         let rising = self.signs[switch] < 0.0;
+        let at_begin = self.at_begin[switch];
         let before = slopes(system, time, time_step, z)?;
         let condition = derivatives(system, switch, time, z);
-        let mut reset = ResetDerivatives::identity(n, system.p);
-        system.dynamics.reset_derivatives(switch, rising, time, &z[..n], &mut reset);
-        let at_begin = self.at_begin[switch];
-        system.dynamics.reset(switch, rising, time, &mut z[..n]);
-        let after = slopes(system, time, time_step, z)?;
-        if system.p > 0 {
-            carry_across(z, n, system.p, (&before, &after), &condition, &reset);
-            if let Some(place) = first_not_finite(&z[n..]) {
-                return Err(Refusal::new(time, FailureCause::NotFinite).blaming(Some(place / system.p)));
-            }
+        let shift = shift_of_time(z, (system.n, system.p), &before, &condition);
+        move_along(z, system.n, &before, &shift, 1.0);
+        let mut fired = vec![(switch, rising)];
+        let mut at = 0;
+        while let Some(&(switch, rising)) = fired.get(at) {
+            self.reset(system, (switch, rising), time, &shift, z, &mut fired)?;
+            at += 1;
         }
+        let after = slopes(system, time, time_step, z)?;
+        move_along(z, system.n, &after, &shift, -1.0);
+        require_finite(system, time, z)?;
         self.begin(system, time, z, &after);
         if self.values[switch].abs() <= ZERO * at_begin.abs() {
             let slope = derivatives(system, switch, time, z).along(&after);
@@ -165,6 +177,86 @@ impl Events {
             self.signs[switch] = if slope == 0.0 { crossed } else { sign(slope) };
         }
         Ok(())
+    }
+
+    /// One reset; functions that it makes positive are added to those that have `fired`.
+    fn reset<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &mut Augmented<D>,
+        (switch, rising): (usize, bool),
+        time: f64,
+        shift: &[f64],
+        z: &mut [f64],
+        fired: &mut Vec<(usize, bool)>,
+    ) -> Result<(), Refusal> {
+        let n = system.n;
+        let jumps = system.dynamics.acts_on_jumps();
+        let mut before = vec![0.0; if jumps { self.values.len() } else { 0 }];
+        if jumps {
+            system.dynamics.switches(time, &z[..n], &mut before);
+        }
+        let mut reset = ResetDerivatives::identity(n, system.p);
+        system.dynamics.reset_derivatives(switch, rising, time, &z[..n], &mut reset);
+        system.dynamics.reset(switch, rising, time, &mut z[..n]);
+        apply(&mut z[n..], n, &reset, shift);
+        if jumps {
+            self.add_fired(system, time, z, &before, fired)?;
+        }
+        Ok(())
+    }
+
+    /// Functions that a jump has made positive.
+    fn add_fired<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &mut Augmented<D>,
+        time: f64,
+        z: &[f64],
+        before: &[f64],
+        fired: &mut Vec<(usize, bool)>,
+    ) -> Result<(), Refusal> {
+        system.dynamics.switches(time, &z[..system.n], &mut self.values);
+        for k in 0..self.values.len() {
+            // A function that was zero up to rounding has been crossed, not jumped over.
+            let was_zero = before[k].abs() <= ZERO * self.at_begin[k].abs();
+            let jumped = before[k] < 0.0 && !was_zero && self.values[k] > ZERO * before[k].abs();
+            if jumped && system.dynamics.switch_acts(k, true) {
+                if fired.iter().filter(|(other, _)| *other == k).count() > MOST_TOGETHER {
+                    return Err(Refusal::new(time, FailureCause::Chattering));
+                }
+                fired.push((k, true));
+            }
+        }
+        Ok(())
+    }
+
+    /// Changes of the state where clocks tick; the instant does not depend on the parameters.
+    pub fn tick<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &mut Augmented<D>,
+        clocks: &[usize],
+        time: f64,
+        z: &mut [f64],
+    ) -> Result<(), Refusal> {
+        let n = system.n;
+        let mut before = vec![0.0; self.values.len()];
+        system.dynamics.switches(time, &z[..n], &mut before);
+        self.at_begin.copy_from_slice(&before);
+        let mut change = ResetDerivatives::identity(n, system.p);
+        system.dynamics.tick_derivatives(clocks, time, &z[..n], &mut change);
+        system.dynamics.tick(clocks, time, &mut z[..n]);
+        let shift = vec![0.0; system.p];
+        apply(&mut z[n..], n, &change, &shift);
+        let mut fired = Vec::new();
+        if system.dynamics.acts_on_jumps() {
+            self.add_fired(system, time, z, &before, &mut fired)?;
+        }
+        let mut at = 0;
+        while let Some(&event) = fired.get(at) {
+            system.work.events.push((time, event.0));
+            self.reset(system, event, time, &shift, z, &mut fired)?;
+            at += 1;
+        }
+        require_finite(system, time, z)
     }
 
     /// Events without end in a finite time (a ball that comes to rest by bouncing).
@@ -224,23 +316,47 @@ fn slopes<D: Dynamics + ?Sized>(
     }
 }
 
-fn carry_across(
-    z: &mut [f64],
-    n: usize,
-    p: usize,
-    (before, after): (&[f64], &[f64]),
-    condition: &SwitchDerivatives,
-    reset: &ResetDerivatives,
-) {
+/// `dtau/dtheta` of an instant at which a function is zero; empty in nominal runs.
+fn shift_of_time(z: &[f64], (n, p): (usize, usize), before: &[f64], condition: &SwitchDerivatives) -> Vec<f64> {
     let rate = condition.along(before);
-    let s = &mut z[n..];
+    let s = &z[n..];
+    (0..p)
+        .map(|j| {
+            let known: f64 = condition.by_state.iter().enumerate().map(|(i, g)| g * s[i * p + j]).sum();
+            -(known + condition.by_parameter[j]) / rate
+        })
+        .collect()
+}
+
+/// Adds `sign y' dtau/dtheta` to the sensitivities.
+fn move_along(z: &mut [f64], n: usize, slope: &[f64], shift: &[f64], sign: f64) {
+    if shift.is_empty() {
+        return;
+    }
+    for (row, slope) in z[n..].chunks_exact_mut(shift.len()).zip(slope) {
+        row.iter_mut().zip(shift).for_each(|(s, shift)| *s += sign * slope * shift);
+    }
+}
+
+/// `S := R_y S + R_theta + R_t dtau/dtheta`.
+fn apply(s: &mut [f64], n: usize, reset: &ResetDerivatives, shift: &[f64]) {
+    let p = shift.len();
     for j in 0..p {
-        let known: f64 = condition.by_state.iter().enumerate().map(|(i, g)| g * s[i * p + j]).sum();
-        let shift = -(known + condition.by_parameter[j]) / rate;
-        let moved: Vec<f64> = (0..n).map(|i| s[i * p + j] + before[i] * shift).collect();
+        let column: Vec<f64> = (0..n).map(|i| s[i * p + j]).collect();
         for i in 0..n {
-            let carried: f64 = moved.iter().enumerate().map(|(l, m)| reset.by_state[l * n + i] * m).sum();
-            s[i * p + j] = carried + reset.by_parameter[j * n + i] + (reset.by_time[i] - after[i]) * shift;
+            let carried: f64 = column.iter().enumerate().map(|(l, m)| reset.by_state[l * n + i] * m).sum();
+            s[i * p + j] = carried + reset.by_parameter[j * n + i] + reset.by_time[i] * shift[j];
         }
+    }
+}
+
+fn require_finite<D: Dynamics + ?Sized>(system: &Augmented<D>, time: f64, z: &[f64]) -> Result<(), Refusal> {
+    match first_not_finite(z) {
+        Some(place) if place < system.n => Err(Refusal::new(time, FailureCause::NotFinite).blaming(Some(place))),
+        Some(place) => {
+            let component = (place - system.n) / system.p.max(1);
+            Err(Refusal::new(time, FailureCause::NotFinite).blaming(Some(component)))
+        }
+        None => Ok(()),
     }
 }

@@ -13,12 +13,14 @@ mod dormand_prince;
 mod equilibrium;
 mod equilibrium_sparse;
 mod events;
+mod iteration_matrix;
 mod newton;
 mod norm;
 mod problem;
 mod recorder;
 mod run;
 mod runge_kutta;
+mod segments;
 mod start;
 mod stepper;
 mod structure;
@@ -29,13 +31,14 @@ pub use problem::*;
 pub use start::consistent_start;
 
 use run::Run;
+use segments::{first_clocks, segments};
 
 /// Integrates from `start` and returns the solution at `times` (ascending, none before the start).
 ///
 /// `breakpoints` are times at which the right-hand side may jump (steps of an input): a step ends exactly there and the
 /// method starts anew. Right-hand sides are taken as continuous from the right; up to a breakpoint they are evaluated
 /// just before it. At the zeros of switching functions the state is reset and the method starts anew likewise; a
-/// requested time that coincides with an event gets the values before it. Requested times do not shorten steps. Sensitivities are computed where `start.sensitivity` is given,
+/// requested time that coincides with an event gets the values before it, also where a clock ticks ([`Dynamics::tick`]). Requested times do not shorten steps. Sensitivities are computed where `start.sensitivity` is given,
 /// as exact derivatives of the discrete solution for the steps taken.
 ///
 /// # Errors
@@ -57,16 +60,23 @@ pub fn integrate<D: Dynamics + ?Sized>(
         return Err(invalid(start.time, None));
     }
     let mut planned = 0;
-    let segments = segments(start.time, times, breakpoints);
-    if let Err(refusal) = run.take_start(segments.first().map_or(start.time, |segment| segment.0)) {
+    let periods = run.system.dynamics.clock_periods().to_vec();
+    let Some(segments) = segments(start.time, times, breakpoints, &periods, options.maximum_steps) else {
+        return Err(Failure { cause: FailureCause::TooManySteps, ..invalid(start.time, None) });
+    };
+    let outcome = run
+        .take_start(segments.first().map_or(start.time, |segment| segment.end))
+        .and_then(|()| run.tick(&first_clocks(start.time, &periods)));
+    if let Err(refusal) = outcome {
         return Err(refusal.with_work(run.system.work));
     }
-    for (end, discontinuous) in segments {
+    for segment in segments {
+        let (end, discontinuous) = (segment.end, segment.discontinuous);
         let outcome = match &options.follow_plan {
             Some(plan) => run.follow(plan, planned, end, discontinuous).map(|next| planned = next),
             None => run.segment(end, discontinuous),
         };
-        if let Err(refusal) = outcome {
+        if let Err(refusal) = outcome.and_then(|()| run.tick(&segment.clocks)) {
             return Err(refusal.with_work(run.system.work));
         }
     }
@@ -80,17 +90,6 @@ fn without_states(times: &[f64], options: &Options) -> Solution {
     Solution { times: times.to_vec(), work, plan: options.record_plan.then(Plan::default), ..Solution::default() }
 }
 
-/// Ends of the segments between start, breakpoints and last requested time; true where it is a breakpoint.
-fn segments(start: f64, times: &[f64], breakpoints: &[f64]) -> Vec<(f64, bool)> {
-    let Some(&last) = times.last().filter(|&&last| last > start) else { return Vec::new() };
-    let mut ends: Vec<f64> = breakpoints.iter().copied().filter(|b| *b > start && *b < last).collect();
-    ends.sort_by(f64::total_cmp);
-    ends.dedup();
-    let mut segments: Vec<_> = ends.into_iter().map(|end| (end, true)).collect();
-    segments.push((last, breakpoints.contains(&last)));
-    segments
-}
-
 fn check<D: Dynamics + ?Sized>(dynamics: &D, start: &Start, times: &[f64], options: &Options) -> Result<(), Failure> {
     let (n, p) = (dynamics.dimension(), dynamics.parameter_count());
     let positive = |values: &[f64]| values.iter().position(|v| !(*v > 0.0 && v.is_finite()));
@@ -101,6 +100,7 @@ fn check<D: Dynamics + ?Sized>(dynamics: &D, start: &Start, times: &[f64], optio
         && start.y_prime.len() == n
         && dynamics.scale().len() == n
         && dynamics.differential().len() == n
+        && positive(dynamics.clock_periods()).is_none()
         && (start.sensitivity.is_empty() || start.sensitivity.len() == n * p)
         && (dynamics.parameter_scale().is_empty() || dynamics.parameter_scale().len() == p);
     let order = start.time.is_finite()

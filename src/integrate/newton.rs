@@ -1,10 +1,10 @@
 //! Newton's method for the implicit equations of one step, with a matrix kept as long as it serves.
 
 use super::augmented::Augmented;
+use super::iteration_matrix::IterationMatrix;
 use super::norm::ErrorNorm;
 use super::problem::{Dynamics, FailureCause};
 use super::stepper::first_not_finite;
-use crate::linear::Factorisation;
 
 const MAXIMUM_ITERATIONS: usize = 4;
 /// Remaining error of the iteration, in the error norm, at which it stops (Hindmarsh-2005).
@@ -79,22 +79,17 @@ impl StepEnd<'_> {
 }
 
 pub(super) struct Newton {
-    factorisation: Factorisation,
-    /// Leading coefficient the factors were made for.
-    leading: Option<f64>,
+    matrix: IterationMatrix,
     rate_factor: f64,
     /// Leading coefficient of the last step solved.
     last_leading: f64,
     delta: Vec<f64>,
-    /// Columns of multipliers: scaled by the leading coefficient, so that the matrix stays well conditioned however
-    /// short the step (Hairer-Wanner-1996, VII.4).
-    is_multiplier: Vec<bool>,
-    has_multipliers: bool,
-    scaled: Vec<f64>,
-    /// `c dF/dy'` at the last renewal, for [`Newton::filter`]; empty where there is nothing to filter.
+    /// `c dF/dy'` at the last renewal, for [`Newton::filter`]; empty where there is nothing to filter or the factor of every
+    /// derivative is one.
     mass: Vec<f64>,
     has_hidden_algebraic: bool,
-    /// For `y' = f`: a bound of the eigenvalues of f_y (row sums in typical magnitudes) at the last renewal; infinite else.
+    /// For `y' = f`: a bound of the eigenvalues of f_y (row sums in typical magnitudes) at the last renewal; infinite where
+    /// it is not known.
     pub eigenvalue_bound: f64,
     filtered: Vec<f64>,
 }
@@ -102,14 +97,10 @@ pub(super) struct Newton {
 impl Newton {
     pub fn new<D: Dynamics + ?Sized>(system: &Augmented<D>) -> Self {
         Self {
-            factorisation: Factorisation::new(system.dynamics.pattern()),
-            leading: None,
+            matrix: IterationMatrix::new(system),
             rate_factor: CAUTIOUS_RATE,
             last_leading: 0.0,
             delta: vec![0.0; system.n],
-            has_multipliers: system.structure.has_constraints(),
-            is_multiplier: system.structure.is_multiplier.clone(),
-            scaled: Vec::new(),
             mass: Vec::new(),
             has_hidden_algebraic: system.structure.has_hidden_algebraic,
             eigenvalue_bound: f64::INFINITY,
@@ -119,54 +110,29 @@ impl Newton {
 
     /// Drops the matrix.
     pub fn forget(&mut self) {
-        self.leading = None;
+        self.matrix.forget();
     }
 
     fn serves(&self, c: f64) -> bool {
-        self.leading.is_some_and(|leading| {
+        self.matrix.leading().is_some_and(|leading| {
             let ratio = c / leading;
             (1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&ratio)
         })
     }
 
     fn renew<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, end: &StepEnd) -> Result<(), NewtonFailure> {
-        system.linearise(end.time, end.y, end.y_prime, end.leading);
-        system.work.factorisations += 1;
-        self.leading = None;
-        self.scaled.clone_from(&system.jacobian);
-        if self.has_multipliers {
-            for (value, &column) in self.scaled.iter_mut().zip(&system.jacobian_columns) {
-                *value *= if self.is_multiplier[column] { end.leading } else { 1.0 };
-            }
-        }
-        self.factorisation.factor(&self.scaled).map_err(|singular| match first_not_finite(&system.jacobian) {
-            Some(entry) => {
-                NewtonFailure { cause: FailureCause::NotFinite, component: Some(system.jacobian_rows[entry]) }
-            }
-            None => NewtonFailure { cause: FailureCause::SingularMatrix, component: Some(singular.column) },
-        })?;
-        self.leading = Some(end.leading);
+        self.matrix.renew(system, (end.time, end.y, end.y_prime), end.leading)?;
         self.rate_factor = CAUTIOUS_RATE;
-        if self.has_hidden_algebraic {
+        if self.has_hidden_algebraic && !system.structure.has_unit_mass {
             self.renew_mass(system, end);
         }
-        if system.explicit {
+        if system.explicit && !self.matrix.is_expanded() {
             self.eigenvalue_bound = bound_of_eigenvalues(system, end.leading);
         }
         Ok(())
     }
 
     fn renew_mass<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, end: &StepEnd) {
-        if system.structure.has_unit_mass {
-            let differential = system.dynamics.differential();
-            let places = system.jacobian_rows.iter().zip(&system.jacobian_columns);
-            let unit = |(row, column): (&usize, &usize)| {
-                if row == column && differential[*column] { end.leading } else { 0.0 }
-            };
-            self.mass.clear();
-            self.mass.extend(places.map(unit));
-            return;
-        }
         self.mass.clone_from(&system.jacobian);
         system.linearise(end.time, end.y, end.y_prime, 0.0);
         self.mass.iter_mut().zip(&mut system.jacobian).for_each(|(both, by_y)| {
@@ -177,7 +143,7 @@ impl Newton {
 
     /// Whether the system has constraints with multipliers.
     pub fn has_multipliers(&self) -> bool {
-        self.has_multipliers
+        self.matrix.has_multipliers()
     }
 
     /// Replaces an error by what it does to the solution, `J^-1 c dF/dy' e`, where some combinations of differential
@@ -193,6 +159,15 @@ impl Newton {
             if width == 0 || part.is_empty() {
                 continue;
             }
+            if system.structure.has_unit_mass {
+                let leading = self.matrix.leading().unwrap_or(0.0);
+                for (row, differential) in part.chunks_exact_mut(width).zip(system.dynamics.differential()) {
+                    let factor = if *differential { leading } else { 0.0 };
+                    row.iter_mut().for_each(|e| *e *= factor);
+                }
+                self.matrix.solve_block(part, width);
+                continue;
+            }
             self.filtered.clear();
             self.filtered.resize(n * width, 0.0);
             for ((value, &row), &column) in self.mass.iter().zip(&system.jacobian_rows).zip(&system.jacobian_columns) {
@@ -200,7 +175,7 @@ impl Newton {
                     self.filtered[row * width + j] += value * part[column * width + j];
                 }
             }
-            self.factorisation.solve_block(&mut self.filtered, width);
+            self.matrix.solve_block(&mut self.filtered, width);
             part.copy_from_slice(&self.filtered);
         }
     }
@@ -278,9 +253,8 @@ impl Newton {
         if let Some(component) = first_not_finite(&self.delta) {
             return Err(NewtonFailure { cause: FailureCause::NotFinite, component: Some(component) });
         }
-        self.factorisation.solve(&mut self.delta);
-        self.scale_multipliers_of_delta();
-        let ratio = self.leading.map_or(1.0, |leading| end.leading / leading);
+        self.matrix.solve_block(&mut self.delta, 1);
+        let ratio = self.matrix.leading().map_or(1.0, |leading| end.leading / leading);
         let factor = -2.0 / (1.0 + ratio);
         self.delta.iter_mut().for_each(|d| *d *= factor);
         Ok(())
@@ -340,17 +314,6 @@ impl Newton {
     }
 
     pub fn solve_block(&mut self, right_hand_sides: &mut [f64], width: usize) {
-        self.factorisation.solve_block(right_hand_sides, width);
-        if let Some(leading) = self.leading.filter(|_| self.has_multipliers) {
-            let rows = right_hand_sides.chunks_exact_mut(width).zip(&self.is_multiplier);
-            rows.filter(|(_, is)| **is).for_each(|(row, _)| row.iter_mut().for_each(|value| *value *= leading));
-        }
-    }
-
-    fn scale_multipliers_of_delta(&mut self) {
-        if let Some(leading) = self.leading.filter(|_| self.has_multipliers) {
-            let multipliers = self.delta.iter_mut().zip(&self.is_multiplier);
-            multipliers.filter(|(_, is)| **is).for_each(|(value, _)| *value *= leading);
-        }
+        self.matrix.solve_block(right_hand_sides, width);
     }
 }

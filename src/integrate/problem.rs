@@ -31,6 +31,17 @@ pub trait Dynamics {
     /// Values of dF/dy + c dF/dy' in the order of [`Dynamics::pattern`].
     fn jacobian(&mut self, t: f64, y: &[f64], y_prime: &[f64], c: f64, values: &mut [f64]);
 
+    /// Structure of a square matrix that has further unknowns behind the n components, each with an equation of its own behind
+    /// those of F, and from which dF/dy + c dF/dy' follows by their elimination. Given for large systems of the form
+    /// `y' = f`, `0 = g` where it has far fewer entries than the Jacobian itself.
+    fn expanded_pattern(&self) -> Option<&SparsityPattern> {
+        None
+    }
+
+    /// Values of that matrix in the order of [`Dynamics::expanded_pattern`], the columns of components in units of `scale`
+    /// (positive, length n). Must be given along with a pattern.
+    fn expanded_jacobian(&mut self, _t: f64, _y: &[f64], _c: f64, _scale: &[f64], _values: &mut [f64]) {}
+
     /// dF/dtheta, n x p column-major.
     fn parameter_derivative(&mut self, t: f64, y: &[f64], y_prime: &[f64], values: &mut [f64]);
 
@@ -101,6 +112,27 @@ pub trait Dynamics {
 
     /// At a zero of function `k`: changes the mode of the equations, and the state where it jumps.
     fn reset(&mut self, _k: usize, _rising: bool, _t: f64, _y: &mut [f64]) {}
+
+    /// Whether a change of sign of function `k` is an event; where not, the right-hand side is smooth there.
+    fn switch_acts(&self, _k: usize, _rising: bool) -> bool {
+        true
+    }
+
+    /// Whether a function that becomes positive by the jump of another event acts at once.
+    fn acts_on_jumps(&self) -> bool {
+        false
+    }
+
+    /// Periods of clocks, s, positive: at all multiples of them from the start on the state changes by [`Dynamics::tick`].
+    fn clock_periods(&self) -> &[f64] {
+        &[]
+    }
+
+    /// Changes the state where these clocks tick at the same time.
+    fn tick(&mut self, _clocks: &[usize], _t: f64, _y: &mut [f64]) {}
+
+    /// Derivatives of [`Dynamics::tick`]; those of no change on entry. `y` is the state before it.
+    fn tick_derivatives(&mut self, _clocks: &[usize], _t: f64, _y: &[f64], _derivatives: &mut ResetDerivatives) {}
 
     /// Name of component `i` in the study's words, for messages.
     fn component_name(&self, i: usize) -> String {

@@ -70,7 +70,8 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
         system.work.reason = reason.to_owned();
         system.work.span = (start.time, times.last().copied().unwrap_or(start.time));
         let switches = system.dynamics.switch_count();
-        let events = (switches > 0).then(|| Events::new(switches, z.len()));
+        let has_clocks = !system.dynamics.clock_periods().is_empty();
+        let events = (switches > 0 || has_clocks).then(|| Events::new(switches, z.len()));
         let automatic = method == Method::Explicit && options.method == MethodChoice::Automatic;
         Self {
             recorder: Recorder::new(n, p, times, options.record_plan),
@@ -189,6 +190,15 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
         Ok(next)
     }
 
+    /// Lets clocks tick between two segments.
+    pub fn tick(&mut self, clocks: &[usize]) -> Result<(), Refusal> {
+        if let (Some(events), false) = (&mut self.events, clocks.is_empty()) {
+            events.tick(&mut self.system, clocks, self.time, &mut self.z)?;
+            self.has_passed_start = true;
+        }
+        Ok(())
+    }
+
     fn begin_segment(&mut self, end: f64, discontinuous: bool) -> Result<(), Refusal> {
         self.system.last_time = if discontinuous { end.next_down() } else { f64::INFINITY };
         if self.method == Method::Bdf && self.has_passed_start {
@@ -251,10 +261,10 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
     /// Whether the step just taken ended in an event; the solution then goes on from there.
     fn heed_events(&mut self, end: f64) -> Result<bool, Refusal> {
         let to = self.step_end();
-        if self.method == Method::Explicit && self.events.is_some() {
+        if self.method == Method::Explicit && self.system.dynamics.switch_count() > 0 {
             self.runge_kutta.prepare_interpolation(&mut self.system);
         }
-        let Some(events) = &mut self.events else { return Ok(false) };
+        let Some(events) = self.events.as_mut().filter(|events| events.has_switches()) else { return Ok(false) };
         let system = &mut self.system;
         let found = match self.method {
             Method::Explicit => events.find(system, self.time, to, |t, z| self.runge_kutta.interpolate(t, z)),

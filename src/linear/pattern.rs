@@ -1,7 +1,7 @@
 //! Structure of a sparse matrix.
 
 /// Compressed sparse columns: rows of column j are `rows[starts[j]..starts[j + 1]]`, ascending.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SparsityPattern {
     pub row_count: usize,
     pub column_count: usize,

@@ -5,13 +5,13 @@ use super::kinematics::FrameMotion;
 use super::multipliers::{Loops, algebraic_part};
 use super::scale::typical_magnitude;
 use super::starts::starts;
-use super::system::{Output, StartEquation, System, Variable, VariableKind};
+use super::system::{Event, Output, StartEquation, System, Variable, VariableKind};
 use super::topology::{Axis, Coordinate, Tree};
 use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::expression::vector::Vector;
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::Dimension;
-use crate::study::{ReactionQuantity, Study};
+use crate::study::{EventTrigger, ReactionQuantity, Study};
 use std::collections::HashMap;
 
 /// How fast a quaternion whose length has drifted returns to length one, 1/s: slow against every motion, so that it costs no
@@ -25,7 +25,7 @@ pub(super) fn assemble(
     frames: &[FrameMotion],
     accelerated: &[Accelerated],
     meaning: &HashMap<Symbol, Node>,
-    (loops, reactions): (Loops, Vec<(ReactionQuantity, Node)>),
+    (loops, reactions, changes): (Loops, Vec<(ReactionQuantity, Node)>, Vec<Vec<(Symbol, Node)>>),
 ) -> Result<System, Vec<Diagnostic>> {
     let modes = tree.modal.iter().flat_map(|modal| &modal.links);
     let moving: Vec<usize> = tree.links_of_joint.iter().flatten().chain(modes).copied().collect();
@@ -48,6 +48,7 @@ pub(super) fn assemble(
     let name_and_value = |((name, ..), value): ((&str, Node, Span), Node)| Output { name: name.to_owned(), value };
     let outputs: Vec<Output> = study.outputs().zip(values).map(name_and_value).collect();
     let probes = probes(&mut graph, study, meaning);
+    let events = events(&mut graph, study, &states, meaning, changes);
     let starts = all_starts(&mut graph, study, &states, meaning, &loops.closed)?;
     let (algebraic, constraints, constraint_names) = algebraic_part(&mut graph, study, &loops, &reactions);
 
@@ -64,6 +65,7 @@ pub(super) fn assemble(
         parameters: study.parameters.iter().map(|p| p.symbol).collect(),
         parameter_names: study.parameters.iter().map(|p| p.name.clone()).collect(),
         outputs,
+        events,
         probes,
         starts,
     };
@@ -165,6 +167,25 @@ fn state_variables(study: &Study, tree: &Tree, moving: &[usize]) -> Vec<Variable
     positions.into_iter().chain(velocities).chain(laws).collect()
 }
 
+fn events(
+    graph: &mut Graph,
+    study: &Study,
+    states: &[Variable],
+    meaning: &HashMap<Symbol, Node>,
+    changes: Vec<Vec<(Symbol, Node)>>,
+) -> Vec<Event> {
+    let place = |symbol: Symbol| states.iter().position(|state| state.symbol == symbol);
+    let event = |(event, changes): (&crate::study::Event, Vec<(Symbol, Node)>)| {
+        let trigger = match event.trigger {
+            EventTrigger::Rises(condition) => EventTrigger::Rises(graph.substitute(&[condition], meaning)[0]),
+            every @ EventTrigger::Every(_) => every,
+        };
+        let changes = changes.into_iter().filter_map(|(symbol, value)| Some((place(symbol)?, value))).collect();
+        Event { name: event.owner.clone(), trigger, changes }
+    };
+    study.events.iter().zip(changes).map(event).collect()
+}
+
 fn probes(graph: &mut Graph, study: &Study, meaning: &HashMap<Symbol, Node>) -> Vec<Output> {
     let mut probes = Vec::new();
     for place in &study.places {
@@ -201,7 +222,11 @@ fn all_starts(
         }
         let values: Vec<Node> = start.overrides.iter().map(|&(_, value)| value).collect();
         let values = graph.substitute(&values, meaning);
-        let overrides: Vec<(Symbol, Node)> = start.overrides.iter().map(|&(symbol, _)| symbol).zip(values).collect();
+        // No balance determines states that change at events only.
+        let held = study.states.iter().filter(|state| graph.is_zero(state.derivative));
+        let mut overrides: Vec<(Symbol, Node)> =
+            held.filter_map(|state| Some((state.symbol, *initial.get(&state.symbol)?))).collect();
+        overrides.extend(start.overrides.iter().map(|&(symbol, _)| symbol).zip(values));
         match starts(graph, &states, (&name, start.base, span), &initial, &overrides) {
             Ok(equations) => result.push(equations),
             Err(found) => errors.extend(found),
@@ -218,6 +243,7 @@ fn refuse_unknown_symbols(study: &Study, tree: &Tree, system: &System) -> Result
     known.insert(system.time);
     let mut roots: Vec<Node> = system.rates.clone();
     roots.extend(system.outputs.iter().map(|output| output.value));
+    roots.extend(system.events.iter().flat_map(|event| event.nodes()));
     roots.extend(system.starts.iter().flatten().filter_map(|equation| match equation {
         StartEquation::Value(node) => Some(*node),
         StartEquation::Equilibrium => None,
@@ -260,6 +286,11 @@ fn refuse_unknown_symbols(study: &Study, tree: &Tree, system: &System) -> Result
     for (output, (name, _, span)) in system.outputs.iter().zip(study.outputs()) {
         let what = if measured.contains(&name) { "measure" } else { "criterion" };
         check(&format!("{what} `{name}`"), output.value, span);
+    }
+    for (event, declared) in system.events.iter().zip(&study.events) {
+        for node in event.nodes() {
+            check(&format!("an event of `{}`", event.name), node, declared.span);
+        }
     }
     for (equations, (_, _, span)) in system.starts.iter().zip(study.starts()) {
         for (state, equation) in system.states.iter().zip(equations) {

@@ -4,6 +4,7 @@ use super::articulated::{self, Accelerated, Inertia, Wrench};
 use super::assemble::assemble;
 use super::closing::closing_coordinate;
 use super::elastic::refuse_large_modes;
+use super::events;
 use super::forces::{self, Effect, ForceGeometry};
 use super::inertia::refuse_missing_inertia;
 use super::kinematics::{self, FrameMotion, SpatialMotion};
@@ -47,7 +48,11 @@ pub fn derive(study: &Study) -> Result<System, Vec<Diagnostic>> {
     add_accelerations(&mut graph, study, &tree, &frames, &accelerated, &mut meaning);
     let reactions =
         add_reactions(&mut graph, study, (&tree, &frames), &accelerated, (&geometries, &loads), &loops, &mut meaning);
-    assemble(graph, study, &tree, &frames, &accelerated, &meaning, (loops, reactions))
+    let changes =
+        events::changes(&mut graph, study, &tree, (&geometries, &loads), &meaning, &loops, |graph, loads| {
+            accelerate(graph, study, &tree, &frames, &inertias, (&geometries, loads), &loops)
+        })?;
+    assemble(graph, study, &tree, &frames, &accelerated, &meaning, (loops, reactions, changes))
 }
 
 fn force_geometries(

@@ -4,7 +4,10 @@ use super::system::{StartEquation, System, VariableKind};
 use super::topology::{Tree, spanning_tree};
 use crate::diagnostics::Diagnostic;
 use crate::expression::{Graph, Node, Printer};
-use crate::study::{Attachment, AxisMotion, Elastic, Force, ForcePlace, Joint, JointKind, Motion, StartBase, Study};
+use crate::study::{
+    Attachment, AxisMotion, ChangeTarget, Elastic, EventTrigger, Force, ForcePlace, Joint, JointKind, Motion,
+    StartBase, Study,
+};
 use std::fmt::Write;
 
 /// The spanning tree: ground, joints with their coordinates, bodies.
@@ -157,6 +160,16 @@ pub fn emit_model(study: &Study, system: &System) -> String {
         let _ = writeln!(text, "state {} from {}", state.name, printer.text(state.initial));
         let _ = writeln!(text, "  {}' = {}", state.name, printer.text(state.derivative));
     }
+    for event in &study.events {
+        let _ = writeln!(text, "event of {}: {}", event.owner, trigger_text(event.trigger, |node| printer.text(node)));
+        for (target, value) in &event.changes {
+            let name = match target {
+                ChangeTarget::State(symbol) => study.graph.symbol_name(*symbol).to_owned(),
+                ChangeTarget::Rate(force) => format!("{}.rate", study.forces[*force].name),
+            };
+            let _ = writeln!(text, "  {name} := {}", printer.text(*value));
+        }
+    }
     for measure in &study.measures {
         let _ = writeln!(text, "measure {} [{}] = {}", measure.name, measure.unit.symbol, printer.text(measure.value));
     }
@@ -262,6 +275,17 @@ fn input_names(study: &Study) -> Vec<String> {
     study.inputs.iter().map(|input| input.name.clone()).collect()
 }
 
+fn plain_text(system: &System, inputs: &[String], node: Node) -> String {
+    Printer::plain(&system.graph, inputs).text(node)
+}
+
+fn trigger_text(trigger: EventTrigger, print: impl Fn(Node) -> String) -> String {
+    match trigger {
+        EventTrigger::Rises(condition) => format!("when 0 < {}", print(condition)),
+        EventTrigger::Every(period) => format!("every {period} s"),
+    }
+}
+
 /// Rates, constraints, outputs and given start values as formulas; common subexpressions are named once.
 pub fn emit_equations(study: &Study, system: &System) -> String {
     let inputs = input_names(study);
@@ -285,6 +309,16 @@ pub fn emit_equations(study: &Study, system: &System) -> String {
     }
     for &constraint in &system.constraints {
         let _ = writeln!(text, "  0 = {}", printer.text(constraint));
+    }
+    if !system.events.is_empty() {
+        text.push_str("\nevents\n");
+    }
+    for event in &system.events {
+        let trigger = trigger_text(event.trigger, |node| plain_text(system, &inputs, node));
+        let _ = writeln!(text, "  {}: {trigger}", event.name);
+        for &(state, value) in &event.changes {
+            let _ = writeln!(text, "    {} := {}", system.states[state].name, plain_text(system, &inputs, value));
+        }
     }
     text.push_str("\noutputs\n");
     for output in &system.outputs {

@@ -17,6 +17,7 @@ mod derive;
 mod elastic;
 mod emit;
 mod emit_latex;
+mod events;
 mod forces;
 mod inertia;
 mod kinematics;

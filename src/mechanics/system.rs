@@ -3,6 +3,7 @@
 use crate::diagnostics::Diagnostic;
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::Dimension;
+use crate::study::EventTrigger;
 use std::collections::HashMap;
 
 /// `x' = rates(t, x, w, theta)`, `0 = constraints(t, x, w, theta)`, `y = outputs(t, x, w, theta)`.
@@ -32,6 +33,8 @@ pub struct System {
     pub parameter_names: Vec<String>,
     /// One per output of the study ([`crate::study::Study::outputs`]), in its order: measures, then criteria.
     pub outputs: Vec<Output>,
+    /// What changes states at instants.
+    pub events: Vec<Event>,
     /// Further quantities that can be evaluated along a solution: place probes in the study's order of
     /// `places[..].probes[..]`, flattened.
     pub probes: Vec<Output>,
@@ -67,6 +70,27 @@ pub struct Output {
     pub value: Node,
 }
 
+/// States that change at once; all values are those before.
+#[derive(Clone, Debug)]
+pub struct Event {
+    /// The element whose law declares it.
+    pub name: String,
+    pub trigger: EventTrigger,
+    /// Index into [`System::states`] and the value after the event.
+    pub changes: Vec<(usize, Node)>,
+}
+
+impl Event {
+    /// Everything it is made of.
+    pub fn nodes(&self) -> impl Iterator<Item = Node> {
+        let condition = match self.trigger {
+            EventTrigger::Rises(condition) => Some(condition),
+            EventTrigger::Every(_) => None,
+        };
+        condition.into_iter().chain(self.changes.iter().map(|(_, value)| *value))
+    }
+}
+
 /// How a state starts.
 #[derive(Clone, Copy, Debug)]
 pub enum StartEquation {
@@ -87,6 +111,13 @@ impl System {
             nodes.into_iter().zip(new).for_each(|(node, new)| *node = new);
         };
         substitute(self.rates.iter_mut().chain(&mut self.constraints).collect());
+        let conditions = self.events.iter_mut().filter_map(|event| match &mut event.trigger {
+            EventTrigger::Rises(condition) => Some(condition),
+            EventTrigger::Every(_) => None,
+        });
+        substitute(conditions.collect());
+        let changes = self.events.iter_mut().flat_map(|event| &mut event.changes);
+        substitute(changes.map(|(_, value)| value).collect());
         substitute(self.outputs.iter_mut().chain(&mut self.probes).map(|output| &mut output.value).collect());
         substitute(
             self.starts

@@ -26,12 +26,14 @@ const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
 const NEGLIGIBLE: f64 = 1e-6;
 
 /// Digits to which the gradient of `records` at `theta` agrees with differences along the same steps, in random
-/// directions: the worst of all records, channels and directions. None where there is no parameter.
+/// directions: the worst of all records, channels and directions. None where there is no parameter, or where events move with the parameters.
 ///
 /// # Errors
 /// [`Failure`] of the run itself.
 pub fn certify(compiled: &Compiled, records: &[&Record], theta: &[f64]) -> Result<Option<f64>, Failure> {
-    if theta.is_empty() || records.is_empty() {
+    // Events move with the parameters: there is no sequence of steps to freeze.
+    let has_switches = compiled.model.switch_count() > 0;
+    if theta.is_empty() || records.is_empty() || has_switches {
         return Ok(None);
     }
     let tasks: Vec<(&Record, usize)> =
@@ -67,7 +69,7 @@ fn digits(compiled: &Compiled, record: &Record, theta: &[f64], direction: &[f64]
     let (trajectory, plan) = record_plan(compiled, record, theta, Gradient::AllParameters)?;
     let plan = Arc::new(plan);
     let ours = directional(&trajectory, direction);
-    if compiled.model.state_count() == compiled.model.dimension() {
+    if compiled.model.state_count() == compiled.model.dimension() && !compiled.model.has_events() {
         let exact = tangent(compiled, record, theta, direction, plan)?;
         return Ok(Some(agreement(&trajectory, &ours, &exact)));
     }

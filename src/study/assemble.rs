@@ -29,6 +29,7 @@ impl<'a> Checker<'a> {
         let measures = self.finished_measures();
         self.check_all_fields();
         self.states = self.finished_states();
+        let events = self.finished_events(&forces);
         let experiments = self.finished_experiments();
         let manoeuvres = self.finished_manoeuvres();
         let criteria = self.finished_criteria();
@@ -40,7 +41,8 @@ impl<'a> Checker<'a> {
         let places = self.finished_places(&forces, &measures);
         let effects = self.effect_catalogue();
         self.check_declarations();
-        let roots = self.roots(&gravity, &joints, &forces, &measures, &experiments);
+        let mut roots = self.roots(&gravity, &joints, &forces, &measures, &experiments);
+        roots.extend(events.iter().flat_map(super::model::Event::nodes));
         let kept = self.check_influence(&roots);
         self.check_unused(&roots);
         let (name, title) = self.name_of_study()?;
@@ -68,6 +70,7 @@ impl<'a> Checker<'a> {
             forces,
             signals,
             states: std::mem::take(&mut self.states),
+            events,
             measures,
             point_quantities: std::mem::take(&mut self.point_quantities),
             reactions,

@@ -180,7 +180,7 @@ impl<'a> Checker<'a> {
         Some(Typed::new(self.graph.select(chosen.node, a.node, b.node), a.dimension))
     }
 
-    fn condition(&mut self, value: Typed, span: Span, scope: Scope) -> Option<()> {
+    pub(super) fn condition(&mut self, value: Typed, span: Span, scope: Scope) -> Option<()> {
         if value.is_condition {
             return Some(());
         }

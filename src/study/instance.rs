@@ -7,7 +7,7 @@ use super::kinds::{Form, Kinds};
 use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use crate::expression::Node;
 use crate::quantities::{AngleContent, Dimension};
-use crate::syntax::{Declared, Expression, Field, Name, StateDeclaration};
+use crate::syntax::{Declared, EventDeclaration, Expression, Field, Name, StateDeclaration};
 
 pub(super) struct Instance<'a> {
     /// Name of the element.
@@ -23,6 +23,7 @@ pub(super) struct Instance<'a> {
     pub declared: Vec<&'a Declared>,
     pub bindings: &'a [(Name, Expression)],
     pub states: &'a [StateDeclaration],
+    pub events: &'a [EventDeclaration],
     pub fields: Vec<FlatField<'a>>,
     pub kinds: Kinds,
     pub progress: Progress,

@@ -15,6 +15,7 @@ mod elaborate;
 mod elastic;
 mod elements;
 mod evaluate;
+mod events;
 mod experiments;
 mod fields;
 mod functions;

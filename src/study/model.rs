@@ -31,6 +31,8 @@ pub struct Study {
     pub signals: Vec<Signal>,
     /// States of laws, signals, sensors and effects, in order of declaration.
     pub states: Vec<State>,
+    /// What changes states at instants.
+    pub events: Vec<Event>,
     pub measures: Vec<Measure>,
     /// Symbols for coordinates of points that expressions mention.
     pub point_quantities: Vec<PointQuantity>,
@@ -319,6 +321,43 @@ pub struct State {
     pub initial: Node,
     pub dimension: Dimension,
     pub span: Span,
+}
+
+/// A law changes states at once; all values are those before.
+#[derive(Clone, Debug)]
+pub struct Event {
+    /// The element whose law declares it.
+    pub owner: String,
+    pub trigger: EventTrigger,
+    pub changes: Vec<(ChangeTarget, Node)>,
+    pub span: Span,
+}
+
+impl Event {
+    /// Everything it is made of.
+    pub fn nodes(&self) -> impl Iterator<Item = Node> {
+        let condition = match self.trigger {
+            EventTrigger::Rises(condition) => Some(condition),
+            EventTrigger::Every(_) => None,
+        };
+        condition.into_iter().chain(self.changes.iter().map(|(_, value)| *value))
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub enum EventTrigger {
+    /// The value becomes positive.
+    Rises(Node),
+    /// At all multiples of this time, s, from the start on.
+    Every(f64),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChangeTarget {
+    /// State of a law.
+    State(Symbol),
+    /// Rate of a force element (index in [`Study::forces`]), changed by an impulse along the element.
+    Rate(usize),
 }
 
 #[derive(Clone, Debug)]

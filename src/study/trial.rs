@@ -34,6 +34,8 @@ impl<'a> Checker<'a> {
             return;
         }
         self.check_inside(index, &law.bindings, &law.states);
+        self.instances[index].events = &law.events;
+        self.check_events(index);
         let value = self.evaluate(&law.value, Scope::Instance(index));
         let form = self.form(&law.result);
         if let (Some(value), Some(form)) = (value, form)
@@ -82,6 +84,7 @@ impl<'a> Checker<'a> {
             declared: Vec::new(),
             bindings,
             states,
+            events: &[],
             fields: Vec::new(),
             kinds: Kinds { value: Some(ANY_VALUE), ..Kinds::of(Motion::Translational) },
             progress: Progress::Known,
@@ -165,15 +168,17 @@ impl<'a> Checker<'a> {
         let check = |checker: &mut Self, at: usize, state: &'a StateDeclaration| {
             let symbol = checker.state(index, at, state.name.span);
             let initial = checker.evaluate(&state.initial, scope);
-            let derivative = checker.evaluate(&state.derivative, scope);
+            let derivative = state.derivative.as_ref().map(|written| (checker.evaluate(written, scope), written.span));
             let symbol = symbol?;
             let because = format!("state `{}` has", state.name.text);
             let initial =
                 checker.expect(initial?, state.initial.span, symbol.dimension, (state.name.span, &because), scope);
             let rate = symbol.dimension / Dimension::TIME;
             let because = format!("the derivative of `{}` has", state.name.text);
-            let derivative =
-                checker.expect(derivative?, state.derivative.span, rate, (state.name.span, &because), scope);
+            let derivative = match derivative {
+                Some((value, span)) => checker.expect(value?, span, rate, (state.name.span, &because), scope),
+                None => Some(Typed::new(checker.graph.constant(0.0), rate)),
+            };
             Some((symbol, initial?, derivative?))
         };
         states.iter().enumerate().map(|(at, state)| check(self, at, state)).collect()

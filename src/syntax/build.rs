@@ -57,6 +57,7 @@ fn is_punctuation(rule: Rule) -> bool {
             | close_bracket
             | comma
             | colon
+            | becomes
             | equals
             | arrow
             | range_dots
@@ -520,7 +521,7 @@ impl<'a> Builder<'a> {
         while let Some(pair) = parts.next() {
             self.statement(pair, &mut statements)?;
         }
-        let Statements { parameters, bindings, states, mut values, .. } = statements;
+        let Statements { parameters, bindings, states, events, mut values, .. } = statements;
         if let [first, .., last] = values.as_slice() {
             let (first, last) = (first.span, last.span);
             self.report_repeated("the law has two values", last, first);
@@ -533,7 +534,7 @@ impl<'a> Builder<'a> {
             return None;
         }
         let value = values.swap_remove(0);
-        Some(ItemKind::Law(LawDeclaration { name, ports, result, parameters, bindings, states, value }))
+        Some(ItemKind::Law(LawDeclaration { name, ports, result, parameters, bindings, states, events, value }))
     }
 
     fn effect(&mut self, mut parts: Parts<'_>) -> Built<ItemKind> {
@@ -583,6 +584,7 @@ impl<'a> Builder<'a> {
                 into.bindings.push((name, self.expression(inside.next()?)));
             }
             Rule::state => into.states.push(self.state(inside, span)?),
+            Rule::event => into.events.push(self.event(inside, span)?),
             Rule::result => into.values.push(self.expression(inside.next()?)),
             Rule::adds => into.actions.push(EffectAction::Adds(self.expression(inside.next()?))),
             _ => {
@@ -702,8 +704,11 @@ impl<'a> Builder<'a> {
             None => None,
         };
         let initial = self.expression(parts.next()?);
-        let derivative_name = self.name(parts.next()?.into_inner().next()?);
-        let derivative = self.expression(parts.next()?);
+        let Some(derivative_name) = parts.next() else {
+            return Some(StateDeclaration { name, kind, initial, derivative: None, span });
+        };
+        let derivative_name = self.name(derivative_name.into_inner().next()?);
+        let derivative = Some(self.expression(parts.next()?));
         if derivative_name.text != name.text {
             let message = format!("the derivative of `{}` is called `{}'`", name.text, name.text);
             let finding = Diagnostic::error(Code::UNEXPECTED_TEXT, message)
@@ -712,6 +717,29 @@ impl<'a> Builder<'a> {
             self.diagnostics.push(finding);
         }
         Some(StateDeclaration { name, kind, initial, derivative, span })
+    }
+
+    fn event(&mut self, mut parts: Parts<'_>, span: Span) -> Built<EventDeclaration> {
+        let trigger = match parts.next()?.as_rule() {
+            Rule::when_word => Trigger::When,
+            _ => Trigger::Every,
+        };
+        let expression = self.expression(parts.next()?);
+        let mut changes: Vec<(Name, Expression)> = Vec::new();
+        let mut spans = Vec::new();
+        while let Some(assignment) = parts.next() {
+            spans.push(self.span(&assignment));
+            let mut sides = Parts::of(assignment);
+            let name = self.name(sides.next()?);
+            if let Some((first, _)) = changes.iter().find(|(other, _)| other.text == name.text) {
+                let first = first.span;
+                self.report_repeated(&format!("`{}` is changed twice", name.text), name.span, first);
+            }
+            let value = self.expression(sides.next()?);
+            changes.push((name, value));
+        }
+        self.check_separators(&spans);
+        Some(EventDeclaration { trigger, expression, changes, span })
     }
 
     /// Reports neighbours that are separated neither by a comma nor by a new line.
@@ -748,6 +776,7 @@ struct Statements {
     shapes: Vec<Declared>,
     bindings: Vec<(Name, Expression)>,
     states: Vec<StateDeclaration>,
+    events: Vec<EventDeclaration>,
     actions: Vec<EffectAction>,
     values: Vec<Expression>,
 }

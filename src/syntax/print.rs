@@ -332,6 +332,7 @@ fn law_text(law: &LawDeclaration) -> String {
     let mut lines: Vec<String> = law.parameters.iter().map(|parameter| statement("param", parameter)).collect();
     lines.extend(law.bindings.iter().map(binding));
     lines.extend(law.states.iter().map(state));
+    lines.extend(law.events.iter().map(event));
     lines.push(format!("= {}", print_expression(&law.value)));
     braces(&format!("{head} -> {}", type_text(&law.result)), &lines, "", Layout::Lines)
 }
@@ -405,7 +406,19 @@ fn binding((name, value): &(Name, Expression)) -> String {
 fn state(state: &StateDeclaration) -> String {
     let kind = state.kind.as_ref().map(|kind| format!(": {}", type_text(kind))).unwrap_or_default();
     let (name, initial) = (&state.name.text, print_expression(&state.initial));
-    format!("state {name}{kind} from {initial} {{ {name}' = {} }}", print_expression(&state.derivative))
+    let derivative = state.derivative.as_ref().map(|value| format!(" {{ {name}' = {} }}", print_expression(value)));
+    format!("state {name}{kind} from {initial}{}", derivative.unwrap_or_default())
+}
+
+fn event(event: &EventDeclaration) -> String {
+    let word = match event.trigger {
+        Trigger::When => "when",
+        Trigger::Every => "every",
+    };
+    let change = |(name, value): &(Name, Expression)| format!("{} := {}", name.text, print_expression(value));
+    let changes: Vec<String> = event.changes.iter().map(change).collect();
+    let inside = if changes.is_empty() { String::new() } else { format!(" {} ", changes.join(", ")) };
+    format!("{word} {} {{{inside}}}", print_expression(&event.expression))
 }
 
 // ---- expressions ----

@@ -228,14 +228,34 @@ pub struct TypeExpression {
 }
 
 /// `state z: type from INITIAL { z' = EXPRESSION }` is one state with one derivative; several `state` lines make
-/// several states, each derivative may mention all of them.
+/// several states, each derivative may mention all of them. Without braces the state changes at events only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateDeclaration {
     pub name: Name,
     pub kind: Option<TypeExpression>,
     pub initial: Expression,
-    pub derivative: Expression,
+    /// None: the state keeps its value between events.
+    pub derivative: Option<Expression>,
     pub span: Span,
+}
+
+/// What changes states at instants: `when CONDITION { z := EXPRESSION }`, `every PERIOD { z := EXPRESSION }`. Expressions
+/// take the values before.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EventDeclaration {
+    pub trigger: Trigger,
+    /// The condition or the period.
+    pub expression: Expression,
+    pub changes: Vec<(Name, Expression)>,
+    pub span: Span,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trigger {
+    /// The instant at which a condition becomes true.
+    When,
+    /// Multiples of a period.
+    Every,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -249,6 +269,7 @@ pub struct LawDeclaration {
     /// `let name = expression`
     pub bindings: Vec<(Name, Expression)>,
     pub states: Vec<StateDeclaration>,
+    pub events: Vec<EventDeclaration>,
     /// `= expression`
     pub value: Expression,
 }

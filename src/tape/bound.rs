@@ -1,9 +1,10 @@
 //! Evaluation of a model for one parameter vector and one set of inputs.
 
 use super::InputSource;
+use super::expansion::Memory;
 use super::model::{Element, Model};
 use super::sweep::Scratch;
-use crate::integrate::Dynamics;
+use crate::integrate::{Dynamics, ResetDerivatives, SwitchDerivatives};
 use crate::linear::SparsityPattern;
 
 /// A model with parameters and inputs bound, and the memory of its evaluation.
@@ -16,7 +17,8 @@ pub struct Bound<'a> {
     /// Whether the registers hold the rates at the time and variables that stand in them.
     is_current: bool,
     parameter_scale: Vec<f64>,
-    scratch: Scratch,
+    pub(super) scratch: Scratch,
+    memory: Memory,
 }
 
 /// Start values as far as they are given; see [`Bound::start_values`].
@@ -40,6 +42,7 @@ impl<'a> Bound<'a> {
             is_current: false,
             parameter_scale: Vec::new(),
             scratch: Scratch::default(),
+            memory: Memory::default(),
         };
         bound.set_parameters(theta);
         bound
@@ -225,6 +228,18 @@ impl Dynamics for Bound<'_> {
         }
     }
 
+    fn expanded_pattern(&self) -> Option<&SparsityPattern> {
+        self.model.expansion.as_ref().map(|expansion| &expansion.pattern)
+    }
+
+    fn expanded_jacobian(&mut self, t: f64, y: &[f64], c: f64, scale: &[f64], values: &mut [f64]) {
+        self.update(t, y);
+        if let (Some(expansion), Some(sweep)) = (&self.model.expansion, &self.model.jacobian.sweep) {
+            let memory = (&mut self.scratch, &mut self.memory);
+            expansion.evaluate((sweep, &self.registers, self.inputs), memory, (scale, c), values);
+        }
+    }
+
     fn parameter_derivative(&mut self, t: f64, y: &[f64], _y_prime: &[f64], values: &mut [f64]) {
         self.update(t, y);
         self.model.parameter_derivative.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
@@ -239,6 +254,53 @@ impl Dynamics for Bound<'_> {
         self.update(t, y);
         self.gather(&self.model.rate_registers, rates);
         true
+    }
+
+    fn switch_count(&self) -> usize {
+        self.model.events.whens.len()
+    }
+
+    fn switches(&mut self, t: f64, y: &[f64], values: &mut [f64]) {
+        self.evaluate_switches(t, y, values);
+    }
+
+    fn switch_derivatives(&mut self, k: usize, t: f64, y: &[f64], derivatives: &mut SwitchDerivatives) {
+        self.evaluate_switch_derivatives(k, t, y, derivatives);
+    }
+
+    /// Events happen when a condition becomes true; those that change nothing mark a kink, on either side.
+    fn switch_acts(&self, k: usize, rising: bool) -> bool {
+        rising || self.model.events.whens[k].changes.is_empty()
+    }
+
+    fn acts_on_jumps(&self) -> bool {
+        true
+    }
+
+    fn reset(&mut self, k: usize, rising: bool, t: f64, y: &mut [f64]) {
+        if rising {
+            self.evaluate_changes(&self.model.events.whens[k].changes, t, y);
+        }
+    }
+
+    fn reset_derivatives(&mut self, k: usize, rising: bool, t: f64, y: &[f64], derivatives: &mut ResetDerivatives) {
+        if rising {
+            self.evaluate_change_derivatives(&self.model.events.whens[k].changes, t, y, derivatives);
+        }
+    }
+
+    fn clock_periods(&self) -> &[f64] {
+        &self.model.events.periods
+    }
+
+    fn tick(&mut self, clocks: &[usize], t: f64, y: &mut [f64]) {
+        let changes = self.model.events.changes_of_clocks(clocks);
+        self.evaluate_changes(&changes, t, y);
+    }
+
+    fn tick_derivatives(&mut self, clocks: &[usize], t: f64, y: &[f64], derivatives: &mut ResetDerivatives) {
+        let changes = self.model.events.changes_of_clocks(clocks);
+        self.evaluate_change_derivatives(&changes, t, y, derivatives);
     }
 
     fn equation_name(&self, i: usize) -> String {

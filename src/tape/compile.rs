@@ -1,11 +1,14 @@
 //! From equations to programs.
 
+use super::events::{Change, Events, When};
+use super::expansion::Expansion;
 use super::model::{Derivative, DerivativeForm, Element, Layout, Model, StartProgram};
 use super::program::{Instruction, Program};
 use super::sweep::Sweep;
 use crate::expression::{Binary, Entry, Graph, Node, Operation, Symbol};
 use crate::linear::SparsityPattern;
 use crate::mechanics::{StartEquation, System, Variable};
+use crate::study::EventTrigger;
 use std::collections::BTreeMap;
 use std::collections::HashMap;
 
@@ -34,6 +37,9 @@ impl Model {
         let parameter_derivative = symbolic(&roots.rates, &system.parameters);
         let output_by_state = symbolic(&roots.outputs, &unknowns);
         let output_by_parameter = symbolic(&roots.outputs, &system.parameters);
+        let mut event_columns = [&unknowns[..], &system.parameters].concat();
+        event_columns.push(system.time);
+        let event_derivative = symbolic(&roots.events, &event_columns);
         let start_derivatives: Vec<Vec<Entry>> =
             roots.starts.iter().map(|values| roots.graph.jacobian(values, &system.parameters)).collect();
 
@@ -41,6 +47,8 @@ impl Model {
         let output_derivatives: Vec<Node> = [nodes_of(&output_by_state), nodes_of(&output_by_parameter)].concat();
         let mut everything = [&roots.rates[..], &roots.outputs, &roots.probes, &output_derivatives].concat();
         everything.extend(nodes_of(&jacobian));
+        everything.extend(&roots.events);
+        everything.extend(nodes_of(&event_derivative));
         everything.extend(nodes_of(&parameter_derivative));
         everything.extend(roots.starts.iter().flatten());
         everything.extend(start_derivatives.iter().flat_map(|entries| nodes_of(entries)));
@@ -64,6 +72,8 @@ impl Model {
         };
         let (pattern, diagonal) = iteration_pattern(n, state_count, &jacobian.elements);
         jacobian.place(|row, column| slot_in(&pattern, row, column));
+        let expanded = |sweep| Expansion::new(sweep, assembler.next, &variable_columns, &rate_registers, state_count);
+        let expansion = jacobian.sweep.as_ref().map(expanded);
 
         assembler.registers.clone_from(&after_rates);
         let mut parameter_derivative = if by_sweep {
@@ -90,6 +100,19 @@ impl Model {
         };
         output_by_state.place(dense(m));
         output_by_parameter.place(dense(m));
+
+        assembler.registers.clone_from(&after_rates);
+        let program = assembler.program(&roots.events, Dependence::State);
+        let registers = assembler.registers_of(&roots.events);
+        let derivative = if by_sweep && !registers.is_empty() {
+            let time = [assembler.layout.time as u32];
+            let columns = [&variable_columns[..], &parameter_columns, &time].concat();
+            assembler.swept(&[&prologue, &forcing, &rates, &program], &columns, &registers)
+        } else {
+            let program = assembler.program(&nodes_of(&event_derivative), Dependence::State);
+            assembler.derivative(program, &event_derivative)
+        };
+        let events = events(system, program, registers, derivative);
 
         assembler.registers.clone_from(&after_rates);
         let probes = assembler.program(&roots.probes, Dependence::State);
@@ -124,12 +147,14 @@ impl Model {
             rate_registers,
             jacobian,
             pattern,
+            expansion,
             diagonal,
             parameter_derivative,
             outputs,
             output_registers,
             output_by_state,
             output_by_parameter,
+            events,
             probes,
             probe_registers,
             starts,
@@ -144,6 +169,8 @@ struct Roots {
     rates: Vec<Node>,
     outputs: Vec<Node>,
     probes: Vec<Node>,
+    /// Conditions and new values, event by event.
+    events: Vec<Node>,
     /// Per experiment: the given start values, in state order.
     starts: Vec<Vec<Node>>,
 }
@@ -159,17 +186,42 @@ impl Roots {
             };
             equations.iter().filter_map(value).collect::<Vec<_>>()
         };
-        let mut groups = vec![rates.collect::<Vec<_>>(), values(&system.outputs), values(&system.probes)];
+        let events = system.events.iter().flat_map(|event| event.nodes()).collect();
+        let mut groups = vec![rates.collect::<Vec<_>>(), values(&system.outputs), values(&system.probes), events];
         groups.extend(system.starts.iter().map(given));
         let (mut graph, nodes) = system.graph.extract(&groups.concat());
         let nodes = multiply_by_reciprocals(&mut graph, &nodes, &system.parameters);
         let mut rest = nodes.into_iter();
         let mut groups = groups.iter().map(|group| rest.by_ref().take(group.len()).collect::<Vec<_>>());
         let mut next = || groups.next().unwrap_or_default();
-        let (rates, outputs, probes) = (next(), next(), next());
+        let (rates, outputs, probes, events) = (next(), next(), next(), next());
         let starts = groups.collect();
-        Self { graph, rates, outputs, probes, starts }
+        Self { graph, rates, outputs, probes, events, starts }
     }
+}
+
+/// The layout of events whose conditions and new values stand in rows in the order of [`crate::mechanics::Event::nodes`].
+fn events(system: &System, program: Program, registers: Vec<u32>, derivative: Derivative) -> Events {
+    let mut events = Events { program, registers, derivative, ..Events::default() };
+    let mut rows = 0_u32..;
+    for event in &system.events {
+        let condition = match event.trigger {
+            EventTrigger::Rises(_) => rows.next(),
+            EventTrigger::Every(_) => None,
+        };
+        let changes: Vec<Change> =
+            event.changes.iter().zip(&mut rows).map(|(&(state, _), row)| Change { state: state as u32, row }).collect();
+        match (event.trigger, condition) {
+            (EventTrigger::Every(period), _) => {
+                events.clocks.push(changes);
+                events.periods.push(period);
+            }
+            (EventTrigger::Rises(_), condition) => {
+                events.whens.push(When { condition: condition.unwrap_or_default(), changes });
+            }
+        }
+    }
+    events
 }
 
 /// Divisions of varying values by what only parameters determine, as multiplications: the reciprocal is computed once

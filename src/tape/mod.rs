@@ -10,6 +10,8 @@
 mod bound;
 mod compile;
 mod emit;
+mod events;
+mod expansion;
 mod model;
 mod program;
 mod slopes;

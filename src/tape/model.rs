@@ -1,6 +1,8 @@
 //! The compiled model.
 
 use super::InputSource;
+use super::events::Events;
+use super::expansion::Expansion;
 use super::program::Program;
 use super::sweep::{Scratch, Sweep};
 use crate::linear::SparsityPattern;
@@ -34,6 +36,8 @@ pub struct Model {
     pub(super) rate_registers: Vec<u32>,
     pub(super) jacobian: Derivative,
     pub(super) pattern: SparsityPattern,
+    /// The Jacobian with intermediate results as further unknowns, where derivatives are swept.
+    pub(super) expansion: Option<Expansion>,
     /// Slots of the diagonal of differential variables in the pattern.
     pub(super) diagonal: Vec<u32>,
     pub(super) parameter_derivative: Derivative,
@@ -44,6 +48,7 @@ pub struct Model {
     /// first.
     pub(super) output_by_state: Derivative,
     pub(super) output_by_parameter: Derivative,
+    pub(super) events: Events,
     pub(super) probes: Program,
     pub(super) probe_registers: Vec<u32>,
     pub(super) starts: Vec<StartProgram>,
@@ -165,6 +170,11 @@ impl Model {
         for element in &self.jacobian.elements {
             needs[element.row as usize].push(element.column as usize);
         }
+        for (element, state) in self.changes_by_events() {
+            if (element.column as usize) < n {
+                needs[state].push(element.column as usize);
+            }
+        }
         // Per variable the outputs it influences: those that contain it, or whose variables' equations contain it.
         let mut influences = vec![vec![false; m]; n];
         let mut waiting: Vec<(usize, usize)> = Vec::new();
@@ -178,6 +188,11 @@ impl Model {
         }
         let add = |to: &mut Vec<bool>, from: &[bool]| to.iter_mut().zip(from).for_each(|(to, from)| *to |= from);
         let mut reach = vec![vec![false; m]; p];
+        for (element, state) in self.changes_by_events() {
+            if let Some(j) = (element.column as usize).checked_sub(n).filter(|j| *j < p) {
+                add(&mut reach[j], &influences[state]);
+            }
+        }
         for element in &self.output_by_parameter.elements {
             reach[element.column as usize][element.row as usize] = true;
         }
@@ -186,6 +201,29 @@ impl Model {
             add(&mut reach[element.column as usize], &influences[element.row as usize]);
         }
         reach
+    }
+
+    /// Derivatives of conditions and new values, with each state that changes along with them.
+    fn changes_by_events(&self) -> Vec<(&Element, usize)> {
+        let mut states_of_row: Vec<Vec<usize>> = vec![Vec::new(); self.events.registers.len()];
+        let own = self.events.clocks.iter().chain(self.events.whens.iter().map(|when| &when.changes)).flatten();
+        own.for_each(|change| states_of_row[change.row as usize].push(change.state as usize));
+        for when in &self.events.whens {
+            let states = when.changes.iter().map(|change| change.state as usize);
+            states_of_row[when.condition as usize].extend(states);
+        }
+        let elements = self.events.derivative.elements.iter();
+        elements.flat_map(|e| states_of_row[e.row as usize].iter().map(move |&state| (e, state))).collect()
+    }
+
+    /// Number of functions whose zeros are events.
+    pub fn switch_count(&self) -> usize {
+        self.events.whens.len()
+    }
+
+    /// Whether states change at instants.
+    pub fn has_events(&self) -> bool {
+        !self.events.registers.is_empty()
     }
 
     /// Instructions per evaluation of rates, Jacobian, parameter derivatives, outputs.

@@ -153,10 +153,26 @@ impl Sweep {
         (Self { instructions, groups }, elements)
     }
 
-    /// Computes all elements into their registers; the programs must have run.
-    pub fn run(&self, registers: &mut [f64], inputs: &dyn InputSource, scratch: &mut Scratch) {
+    /// Per instruction its target and the operands that carry derivatives.
+    pub fn dependences(&self) -> impl Iterator<Item = (u32, [Option<u32>; 2])> {
+        self.instructions.iter().map(|linear| (linear.target, tangent_operands(linear)))
+    }
+
+    /// Derivatives of every instruction by the operands of [`Sweep::dependences`]; the programs must have run.
+    pub fn partials<'s>(
+        &self,
+        registers: &[f64],
+        inputs: &dyn InputSource,
+        scratch: &'s mut Scratch,
+    ) -> &'s [[f64; 2]] {
         scratch.partials.clear();
         scratch.partials.extend(self.instructions.iter().map(|linear| partials(linear, registers, inputs)));
+        &scratch.partials
+    }
+
+    /// Computes all elements into their registers; the programs must have run.
+    pub fn run(&self, registers: &mut [f64], inputs: &dyn InputSource, scratch: &mut Scratch) {
+        self.partials(registers, inputs, scratch);
         let longest = self.groups.iter().map(|group| group.steps.len()).max().unwrap_or(0);
         scratch.tangents.resize(1 + WIDTH + longest, [0.0; WIDTH]);
         let tangents = &mut scratch.tangents[..];

@@ -41,6 +41,7 @@ impl Builder {
             forces: vec![],
             signals: vec![],
             states: vec![],
+            events: vec![],
             measures: vec![],
             point_quantities: vec![],
             reactions: vec![],

@@ -3,6 +3,7 @@
 use crate::build::{Builder, GROUND, Random, assert_close};
 use ident::expression::{Node, Unary};
 use ident::integrate::Dynamics;
+use ident::linear::{Factorisation, SparsityPattern};
 use ident::mechanics::derive;
 use ident::study::*;
 use ident::tape::{Bound, DerivativeForm, InputSource, Model};
@@ -237,6 +238,38 @@ fn dense_jacobian(model: &Model, theta: &[f64], t: f64, y: &[f64]) -> Vec<f64> {
         dense[column * y.len() + row] = value;
     }
     dense
+}
+
+/// The matrix with intermediate results as further unknowns has the solution of the Jacobian itself.
+#[test]
+fn expanded_jacobian_has_the_solution_of_the_jacobian() {
+    let system = derive(&cart().study).expect("derivable");
+    let model = Model::compile_with(&system, DerivativeForm::Swept);
+    let mut random = Random(5);
+    let n = model.dimension();
+    for trial in 0..10 {
+        let (t, c) = (0.3 * f64::from(trial), 0.7 + 10.0 * f64::from(trial));
+        let y: Vec<f64> = (0..n).map(|_| random.next()).collect();
+        let scale: Vec<f64> = (0..n).map(|i| 10f64.powi(i as i32 % 5 - 2)).collect();
+        let right: Vec<f64> = (0..n).map(|_| random.next()).collect();
+        let mut bound = Bound::new(&model, &Sines, &THETA);
+        let solve = |pattern: &SparsityPattern, values: &[f64]| {
+            let mut factorisation = Factorisation::new(pattern);
+            factorisation.factor(values).expect("regular");
+            let mut solution = right.clone();
+            solution.resize(pattern.column_count, 0.0);
+            factorisation.solve(&mut solution);
+            solution
+        };
+        let pattern = bound.expanded_pattern().expect("a large model's form").clone();
+        let mut values = vec![0.0; pattern.len()];
+        bound.expanded_jacobian(t, &y, c, &scale, &mut values);
+        let expanded: Vec<f64> = solve(&pattern, &values).iter().zip(&scale).map(|(x, s)| x * s).collect();
+        let pattern = bound.pattern().clone();
+        let mut values = vec![0.0; pattern.len()];
+        bound.jacobian(t, &y, &vec![0.0; n], c, &mut values);
+        assert_close(&expanded, &solve(&pattern, &values), 1e-11);
+    }
 }
 
 /// Both forms of derivatives are the same numbers: by variables, by parameters, of rates and of measures.

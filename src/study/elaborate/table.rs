@@ -20,6 +20,7 @@ pub(super) fn table_law(table: &TableDeclaration) -> LawDeclaration {
         parameters: vec![factor(span)],
         bindings: Vec::new(),
         states: Vec::new(),
+        events: Vec::new(),
         value: Expression { kind: scaled, span },
     }
 }

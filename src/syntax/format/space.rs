@@ -10,7 +10,7 @@ pub(super) fn ends_open(kind: Kind, text: &str) -> bool {
 /// A line that begins with this belongs to the one before.
 pub(super) fn goes_on(first: &Token<'_>) -> bool {
     match first.kind {
-        Kind::Joining => !matches!(first.text.as_str(), "for" | "adds" | "if"),
+        Kind::Joining => !matches!(first.text.as_str(), "for" | "adds" | "if" | "when" | "every"),
         Kind::Sign => first.text != "=",
         Kind::Word => matches!(first.text.as_str(), "at" | "where") && !first.is_followed_by('='),
         _ => false,

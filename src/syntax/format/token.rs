@@ -37,8 +37,10 @@ pub(super) struct Token<'a> {
 }
 
 /// Words after which no operand has been read, so that a minus belongs to what follows.
-const JOINING: [&str; 15] =
-    ["if", "then", "else", "and", "or", "in", "from", "prior", "by", "of", "along", "on", "adds", "neutral", "for"];
+const JOINING: [&str; 17] = [
+    "if", "then", "else", "and", "or", "in", "from", "prior", "by", "of", "along", "on", "adds", "neutral", "for",
+    "when", "every",
+];
 
 pub(super) fn tokens(text: &str) -> Vec<Token<'_>> {
     let mut tokens: Vec<Token<'_>> = Vec::new();
@@ -51,7 +53,7 @@ pub(super) fn tokens(text: &str) -> Vec<Token<'_>> {
         let line = &trimmed[..trimmed.find('\n').unwrap_or(trimmed.len())];
         let (kind, length, text) = read(line, first, tokens.last());
         rest = &trimmed[length..];
-        let declares = kind == Kind::Word && rest.trim_start().starts_with(':');
+        let declares = kind == Kind::Word && rest.trim_start().starts_with(':') && !rest.trim_start().starts_with(":=");
         tokens.push(Token { kind, text, line_feeds, touches: between.is_empty(), declares, rest });
     }
 }
@@ -87,7 +89,7 @@ fn read(line: &str, first: char, before: Option<&Token<'_>>) -> (Kind, usize, St
         }
         _ if first.is_alphabetic() || first == '_' => word(line),
         _ => {
-            let double = ["->", "..", "+-", "<=", ">="].iter().any(|sign| line.starts_with(sign));
+            let double = ["->", "..", "+-", "<=", ">=", ":="].iter().any(|sign| line.starts_with(sign));
             as_written(Kind::Sign, if double { 2 } else { first.len_utf8() })
         }
     }
