@@ -80,7 +80,7 @@ impl IterationMatrix {
         }
         let dynamics = &*system.dynamics;
         let factorisation = self.factorisation.get_or_insert_with(|| {
-            Factorisation::new(dynamics.expanded_pattern().unwrap_or_else(|| dynamics.pattern()))
+            Factorisation::of_leading(dynamics.expanded_pattern().unwrap_or_else(|| dynamics.pattern()), system.n)
         });
         match factorisation.factor(&self.values) {
             Ok(()) => {

@@ -32,10 +32,19 @@ enum Method {
 impl Factorisation {
     /// Analyses the structure; the values come with [`Factorisation::factor`]. The pattern must be square.
     pub fn new(pattern: &SparsityPattern) -> Self {
+        Self::of_leading(pattern, pattern.column_count)
+    }
+
+    /// As [`Factorisation::new`], for right-hand sides that are zero and solutions that nobody reads behind the first
+    /// `wanted` elements; what a solution leaves there is arbitrary.
+    pub fn of_leading(pattern: &SparsityPattern, wanted: usize) -> Self {
         let n = pattern.column_count;
         let dense = n <= DENSE_DIMENSION || pattern.len() as f64 > DENSE_FILL * (n * n) as f64;
-        let method =
-            if dense { Method::Dense(DenseLu::new(pattern)) } else { Method::Sparse(Box::new(SparseLu::new(pattern))) };
+        let method = if dense {
+            Method::Dense(DenseLu::new(pattern))
+        } else {
+            Method::Sparse(Box::new(SparseLu::new(pattern, wanted)))
+        };
         Self { method, dimension: n }
     }
 

@@ -19,6 +19,9 @@ const NONE: usize = usize::MAX;
 /// `P R A Q = L U` with row scaling R, row exchanges P and column order Q.
 #[derive(Clone, Debug)]
 pub(super) struct SparseLu {
+    wanted: usize,
+    forward: Pass,
+    backward: Pass,
     pattern: SparsityPattern,
     /// Position k holds column `columns[k]`.
     columns: Vec<usize>,
@@ -61,9 +64,13 @@ impl Triangle {
 }
 
 impl SparseLu {
-    pub fn new(pattern: &SparsityPattern) -> Self {
+    /// For right-hand sides and solutions of which only the first `wanted` elements count.
+    pub fn new(pattern: &SparsityPattern, wanted: usize) -> Self {
         let n = pattern.column_count;
         Self {
+            wanted,
+            forward: Pass::default(),
+            backward: Pass::default(),
             pattern: pattern.clone(),
             columns: minimum_degree(pattern),
             position: vec![NONE; n],
@@ -86,13 +93,27 @@ impl SparseLu {
         for scale in &mut self.row_scale {
             *scale = 1.0 / *scale;
         }
-        if self.has_structure && self.refactor(values) {
-            return Ok(());
+        if !(self.has_structure && self.refactor(values)) {
+            self.has_structure = false;
+            self.work.fill(0.0);
+            self.find_structure(values)?;
+            self.plan_passes();
+            self.has_structure = true;
+            eprintln!(
+                "N {} nnzA {} L {} U {} fwd {}/{} bwd {}/{} offdiag {}",
+                self.columns.len(),
+                self.pattern.len(),
+                self.lower.rows.len(),
+                self.upper.rows.len(),
+                self.forward.sources.len(),
+                self.forward.targets.len(),
+                self.backward.sources.len(),
+                self.backward.targets.len(),
+                self.columns.iter().zip(&self.pivot_row).filter(|(a, b)| a != b).count()
+            );
         }
-        self.has_structure = false;
-        self.work.fill(0.0);
-        self.find_structure(values)?;
-        self.has_structure = true;
+        self.forward.take_values(&self.lower);
+        self.backward.take_values(&self.upper);
         Ok(())
     }
 
@@ -219,28 +240,110 @@ impl SparseLu {
 
     pub fn solve_block(&mut self, x: &mut [f64], width: usize) {
         let n = self.columns.len();
+        self.block.clear();
         self.block.resize(n * width, 0.0);
-        for (k, &row) in self.pivot_row.iter().enumerate() {
+        for (k, &row) in self.pivot_row.iter().enumerate().filter(|(_, row)| **row < self.wanted) {
             let scale = self.row_scale[row];
             for (a, b) in self.block[k * width..(k + 1) * width].iter_mut().zip(&x[row * width..(row + 1) * width]) {
                 *a = b * scale;
             }
         }
-        for k in 0..n {
-            for l in self.lower.column(k) {
-                subtract_row(&mut self.block, self.lower.positions[l], k, width, self.lower.values[l]);
-            }
+        if width == 1 {
+            self.forward.run_one(&mut self.block, None);
+            self.backward.run_one(&mut self.block, Some(&self.inverse_pivot));
+        } else {
+            self.forward.run(&mut self.block, width, None);
+            self.backward.run(&mut self.block, width, Some(&self.inverse_pivot));
         }
-        for k in (0..n).rev() {
-            for value in &mut self.block[k * width..(k + 1) * width] {
-                *value *= self.inverse_pivot[k];
-            }
-            for u in self.upper.column(k) {
-                subtract_row(&mut self.block, self.upper.rows[u], k, width, self.upper.values[u]);
-            }
-        }
-        for (k, &column) in self.columns.iter().enumerate() {
+        for (k, &column) in self.columns.iter().enumerate().filter(|(_, column)| **column < self.wanted) {
             x[column * width..(column + 1) * width].copy_from_slice(&self.block[k * width..(k + 1) * width]);
+        }
+    }
+
+    /// Which parts of the factors a solution needs: what right-hand sides reach, and what wanted elements depend on.
+    fn plan_passes(&mut self) {
+        let n = self.columns.len();
+        let mut is_reached: Vec<bool> = self.pivot_row.iter().map(|&row| row < self.wanted).collect();
+        self.forward.clear();
+        for k in 0..n {
+            if is_reached[k] {
+                self.lower.column(k).for_each(|l| is_reached[self.lower.positions[l]] = true);
+                self.forward.add(k, self.lower.column(k).map(|l| (self.lower.positions[l], l)));
+            }
+        }
+        let mut is_needed: Vec<bool> = self.columns.iter().map(|&column| column < self.wanted).collect();
+        for k in 0..n {
+            is_needed[k] |= self.upper.column(k).any(|u| is_needed[self.upper.rows[u]]);
+        }
+        self.backward.clear();
+        for k in (0..n).rev().filter(|&k| is_needed[k]) {
+            let entries = self.upper.column(k).map(|u| (self.upper.rows[u], u));
+            self.backward.add(k, entries.filter(|(row, _)| is_needed[*row]));
+        }
+    }
+}
+
+/// The entries of a triangular factor in the order in which a solution reads them.
+#[derive(Clone, Debug, Default)]
+struct Pass {
+    /// Positions whose value is subtracted, and where their entries begin.
+    sources: Vec<(u32, u32)>,
+    targets: Vec<u32>,
+    /// Index of each entry in its triangle.
+    from: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl Pass {
+    fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    fn add(&mut self, source: usize, entries: impl Iterator<Item = (usize, usize)>) {
+        self.sources.push((source as u32, self.targets.len() as u32));
+        for (target, from) in entries {
+            self.targets.push(target as u32);
+            self.from.push(from as u32);
+        }
+    }
+
+    fn take_values(&mut self, triangle: &Triangle) {
+        self.values.clear();
+        self.values.extend(self.from.iter().map(|&from| triangle.values[from as usize]));
+    }
+
+    /// Ends of the entries of each source.
+    fn ends(&self) -> impl Iterator<Item = usize> {
+        let next = self.sources.iter().skip(1).map(|(_, start)| *start as usize);
+        next.chain(std::iter::once(self.targets.len()))
+    }
+
+    fn run_one(&self, x: &mut [f64], inverse_pivot: Option<&[f64]>) {
+        for (&(source, start), end) in self.sources.iter().zip(self.ends()) {
+            let mut value = x[source as usize];
+            if value == 0.0 {
+                continue;
+            }
+            if let Some(inverse) = inverse_pivot {
+                value *= inverse[source as usize];
+                x[source as usize] = value;
+            }
+            let entries = self.targets[start as usize..end].iter().zip(&self.values[start as usize..end]);
+            for (&target, factor) in entries {
+                x[target as usize] -= factor * value;
+            }
+        }
+    }
+
+    fn run(&self, x: &mut [f64], width: usize, inverse_pivot: Option<&[f64]>) {
+        for (&(source, start), end) in self.sources.iter().zip(self.ends()) {
+            let source = source as usize;
+            if let Some(inverse) = inverse_pivot {
+                x[source * width..(source + 1) * width].iter_mut().for_each(|value| *value *= inverse[source]);
+            }
+            for (target, factor) in self.targets[start as usize..end].iter().zip(&self.values[start as usize..end]) {
+                subtract_row(x, *target as usize, source, width, *factor);
+            }
         }
     }
 }
