@@ -215,10 +215,10 @@ impl Events {
         fired: &mut Vec<(usize, bool)>,
     ) -> Result<(), Refusal> {
         system.dynamics.switches(time, &z[..system.n], &mut self.values);
-        for k in 0..self.values.len() {
+        for (k, (&before, &value)) in before.iter().zip(&self.values).enumerate() {
             // A function that was zero up to rounding has been crossed, not jumped over.
-            let was_zero = before[k].abs() <= ZERO * self.at_begin[k].abs();
-            let jumped = before[k] < 0.0 && !was_zero && self.values[k] > ZERO * before[k].abs();
+            let was_zero = before.abs() <= ZERO * self.at_begin[k].abs();
+            let jumped = before < 0.0 && !was_zero && value > ZERO * before.abs();
             if jumped && system.dynamics.switch_acts(k, true) {
                 if fired.iter().filter(|(other, _)| *other == k).count() > MOST_TOGETHER {
                     return Err(Refusal::new(time, FailureCause::Chattering));

@@ -99,18 +99,6 @@ impl SparseLu {
             self.find_structure(values)?;
             self.plan_passes();
             self.has_structure = true;
-            eprintln!(
-                "N {} nnzA {} L {} U {} fwd {}/{} bwd {}/{} offdiag {}",
-                self.columns.len(),
-                self.pattern.len(),
-                self.lower.rows.len(),
-                self.upper.rows.len(),
-                self.forward.sources.len(),
-                self.forward.targets.len(),
-                self.backward.sources.len(),
-                self.backward.targets.len(),
-                self.columns.iter().zip(&self.pivot_row).filter(|(a, b)| a != b).count()
-            );
         }
         self.forward.take_values(&self.lower);
         self.backward.take_values(&self.upper);

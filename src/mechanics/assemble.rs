@@ -1,6 +1,7 @@
 //! The system from its parts: states, rates, measures, starts.
 
 use super::articulated::Accelerated;
+use super::events::Changes;
 use super::kinematics::FrameMotion;
 use super::multipliers::{Loops, algebraic_part};
 use super::scale::typical_magnitude;
@@ -25,7 +26,7 @@ pub(super) fn assemble(
     frames: &[FrameMotion],
     accelerated: &[Accelerated],
     meaning: &HashMap<Symbol, Node>,
-    (loops, reactions, changes): (Loops, Vec<(ReactionQuantity, Node)>, Vec<Vec<(Symbol, Node)>>),
+    (loops, reactions, changes): (Loops, Vec<(ReactionQuantity, Node)>, Vec<Changes>),
 ) -> Result<System, Vec<Diagnostic>> {
     let modes = tree.modal.iter().flat_map(|modal| &modal.links);
     let moving: Vec<usize> = tree.links_of_joint.iter().flatten().chain(modes).copied().collect();
@@ -172,10 +173,10 @@ fn events(
     study: &Study,
     states: &[Variable],
     meaning: &HashMap<Symbol, Node>,
-    changes: Vec<Vec<(Symbol, Node)>>,
+    changes: Vec<Changes>,
 ) -> Vec<Event> {
     let place = |symbol: Symbol| states.iter().position(|state| state.symbol == symbol);
-    let event = |(event, changes): (&crate::study::Event, Vec<(Symbol, Node)>)| {
+    let event = |(event, changes): (&crate::study::Event, Changes)| {
         let trigger = match event.trigger {
             EventTrigger::Rises(condition) => EventTrigger::Rises(graph.substitute(&[condition], meaning)[0]),
             every @ EventTrigger::Every(_) => every,

@@ -12,6 +12,9 @@ use crate::expression::{Graph, Node, Symbol};
 use crate::study::{ChangeTarget, Event, Study};
 use std::collections::HashMap;
 
+/// States by their symbols, with their values after an event.
+pub(super) type Changes = Vec<(Symbol, Node)>;
+
 /// Per event of the study the symbols of states that it changes, with their values after it. `accelerate` gives the
 /// accelerations under other loads of the force elements.
 ///
@@ -25,7 +28,7 @@ pub(super) fn changes(
     meaning: &HashMap<Symbol, Node>,
     loops: &Loops,
     accelerate: impl Fn(&mut Graph, &[Node]) -> Vec<Accelerated>,
-) -> Result<Vec<Vec<(Symbol, Node)>>, Vec<Diagnostic>> {
+) -> Result<Vec<Changes>, Vec<Diagnostic>> {
     let is_impact = |event: &&Event| event.changes.iter().any(|(target, _)| matches!(target, ChangeTarget::Rate(_)));
     if !loops.rows.is_empty()
         && let Some(event) = study.events.iter().find(is_impact)

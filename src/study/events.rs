@@ -7,6 +7,8 @@ use crate::expression::{Binary, Graph, Node, Operation};
 use crate::quantities::Dimension;
 use crate::syntax::{EventDeclaration, Name, Trigger};
 
+pub(super) type SoundEvent<'a> = (&'a EventDeclaration, EventTrigger, Vec<(Target, Node)>);
+
 /// What the name on the left of `:=` means inside a law.
 #[derive(Clone, Copy)]
 pub(super) enum Target {
@@ -40,10 +42,7 @@ impl<'a> Checker<'a> {
     }
 
     /// The sound events of an instance; faults are reported.
-    pub(super) fn check_events(
-        &mut self,
-        index: usize,
-    ) -> Vec<(&'a EventDeclaration, EventTrigger, Vec<(Target, Node)>)> {
+    pub fn check_events(&mut self, index: usize) -> Vec<SoundEvent<'a>> {
         let declarations: &'a [EventDeclaration] = self.instances[index].events;
         let mut sound = Vec::new();
         for declaration in declarations {
