@@ -72,7 +72,9 @@ impl Model {
         };
         let (pattern, diagonal) = iteration_pattern(n, state_count, &jacobian.elements);
         jacobian.place(|row, column| slot_in(&pattern, row, column));
-        let expanded = |sweep| Expansion::new(sweep, assembler.next, &variable_columns, &rate_registers, state_count);
+        let places = (&variable_columns[..], &rate_registers[..]);
+        let sizes = (state_count, jacobian.elements.len());
+        let expanded = |sweep| Expansion::new(sweep, assembler.next, places, sizes);
         let expansion = jacobian.sweep.as_ref().map(expanded);
 
         assembler.registers.clone_from(&after_rates);

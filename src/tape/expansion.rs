@@ -12,8 +12,9 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 const NONE: u32 = u32::MAX;
-/// An intermediate result is eliminated while that changes the number of entries by at most this.
-const LARGEST_GROWTH: i64 = 0;
+/// All intermediate results are eliminated where the Jacobian itself has at most this many times the entries of the matrix with
+/// those that it pays to keep: factors fill in, and those of a smaller matrix fill in less.
+const WORTHWHILE: usize = 2;
 
 /// Matrix of `n` variables and m intermediate results.
 #[derive(Clone, Debug, Default)]
@@ -115,8 +116,13 @@ impl Nodes {
 
 impl Expansion {
     /// Of d(`rows`)/d(`columns`) through the instructions of `sweep`; the first `state_count` rows belong to differential
-    /// variables.
-    pub fn new(sweep: &Sweep, register_count: usize, columns: &[u32], rows: &[u32], state_count: usize) -> Self {
+    /// variables. `jacobian_entries`: structurally non-zero derivatives.
+    pub fn new(
+        sweep: &Sweep,
+        register_count: usize,
+        (columns, rows): (&[u32], &[u32]),
+        (state_count, jacobian_entries): (usize, usize),
+    ) -> Self {
         let n = columns.len();
         let mut node_of = vec![NONE; register_count];
         columns.iter().enumerate().for_each(|(i, &register)| node_of[register as usize] = i as u32);
@@ -147,7 +153,12 @@ impl Expansion {
                 ones.push(nodes.slot((first_row + row) as u32, node));
             }
         }
-        let is_left = eliminate(&mut nodes, n, first_row);
+        let mut is_left = vec![true; first_row];
+        eliminate(&mut nodes, n, &mut is_left, 0);
+        let kept: usize = nodes.operands.iter().map(Vec::len).sum();
+        if jacobian_entries <= WORTHWHILE * kept {
+            eliminate(&mut nodes, n, &mut is_left, i64::MAX);
+        }
         let left: Vec<u32> = (n..first_row).filter(|&node| is_left[node]).map(|node| node as u32).collect();
         Self::assemble(nodes, (seeds, ones), &left, (n, first_row, state_count))
     }
@@ -241,16 +252,19 @@ fn needed(instructions: &[(u32, [Option<u32>; 2])], register_count: usize, rows:
     needed
 }
 
-/// Eliminates instructions, always one with least growth; whether each node is left.
-fn eliminate(nodes: &mut Nodes, first: usize, end: usize) -> Vec<bool> {
-    let mut is_left = vec![true; end];
-    let mut queue: BinaryHeap<Reverse<(i64, u32)>> =
-        (first as u32..end as u32).map(|node| Reverse((nodes.growth(node), node))).collect();
+/// Eliminates instructions (nodes from `first` on), always one with least growth, as long as that changes the number of entries
+/// by at most `largest_growth`.
+fn eliminate(nodes: &mut Nodes, first: usize, is_left: &mut [bool], largest_growth: i64) {
+    let end = is_left.len();
+    let mut queue: BinaryHeap<Reverse<(i64, u32)>> = (first as u32..end as u32)
+        .filter(|&node| is_left[node as usize])
+        .map(|node| Reverse((nodes.growth(node), node)))
+        .collect();
     while let Some(Reverse((growth, node))) = queue.pop() {
         if !is_left[node as usize] || nodes.growth(node) != growth {
             continue;
         }
-        if growth > LARGEST_GROWTH {
+        if growth > largest_growth {
             break;
         }
         is_left[node as usize] = false;
@@ -261,5 +275,4 @@ fn eliminate(nodes: &mut Nodes, first: usize, end: usize) -> Vec<bool> {
             queue.push(Reverse((nodes.growth(other), other)));
         }
     }
-    is_left
 }
