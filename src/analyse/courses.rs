@@ -128,8 +128,14 @@ fn gauss_newton<P: LeastSquares>(problem: &mut P, start: &[f64], bounds: &Bounds
             history.insert(0, (work(1, 0), estimate.cost_history[0]));
             let evaluations = estimate.residual_evaluations + estimate.gradient_evaluations;
             history.push((work(evaluations, estimate.iterations), estimate.cost));
-            Search { converged: estimate.stop_reason.converged(), theta: estimate.theta, cost: estimate.cost, history }
+            Search {
+                converged: estimate.stop_reason.converged(),
+                theta: estimate.theta,
+                cost: estimate.cost,
+                history,
+                stopped: false,
+            }
         }
-        Err(_) => Search { theta: start.to_vec(), cost: f64::INFINITY, history, converged: false },
+        Err(_) => Search { theta: start.to_vec(), cost: f64::INFINITY, history, converged: false, stopped: false },
     }
 }

@@ -1,8 +1,9 @@
 //! `ident compare STUDY`
 
 use super::fit::{SearchArguments, fit_variant};
+use super::output::answer;
 use super::session::Session;
-use super::{Failed, Format, StudyArguments};
+use super::{Failed, StudyArguments};
 use crate::identify::{Candidate, Identification, identification, structures};
 use crate::report;
 
@@ -35,9 +36,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
         result.bic = structure.bic;
         result.structure = Some(structure);
     }
-    match study.format {
-        Format::Text => print!("{}", report::terminal::comparison(&results)),
-        Format::Json => println!("{}", super::output::json(report::json::comparison(&results))?),
-    }
-    Ok(())
+    answer(study.format, || report::terminal::comparison(&results), || report::json::comparison(&results))
 }

@@ -1,9 +1,9 @@
 //! `ident cuts STUDY`
 
 use super::fit::{SearchArguments, fit_variant};
-use super::output::write_whole;
+use super::output::{answer, figure};
 use super::session::Session;
-use super::{Failed, Format, StudyArguments};
+use super::{Failed, StudyArguments};
 use crate::analyse::cuts;
 use crate::report;
 use crate::simulation::Record;
@@ -39,12 +39,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     let estimation: Vec<&Record> = fit.records.iter().filter(|record| record.role == Role::Estimation).collect();
     let result = cuts(&fit.compiled, &fit.fitted, &estimation, arguments.points, arguments.width)
         .map_err(|diagnostic| session.fail(&[diagnostic]))?;
-    if let Some(path) = &arguments.figure {
-        write_whole(path, &report::figure::cuts(&result))?;
-    }
-    match study.format {
-        Format::Text => print!("{}", report::terminal::cuts(&result)),
-        Format::Json => println!("{}", super::output::json(report::json::cuts(&result))?),
-    }
-    Ok(())
+    figure(arguments.figure.as_deref(), || report::figure::cuts(&result))?;
+    answer(study.format, || report::terminal::cuts(&result), || report::json::cuts(&result))
 }

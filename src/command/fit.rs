@@ -1,10 +1,10 @@
 //! `ident fit STUDY`
 
-use super::output::write_whole;
+use super::output::{answer, page};
 use super::session::Session;
-use super::{Failed, Format, StudyArguments};
+use super::{Failed, StudyArguments};
 use crate::fit::{Chosen, Control, Optimiser};
-use crate::identify::{Fitted, Settings, equation_error, fit, identification};
+use crate::identify::{Fitted, Profile, Settings, confidence, equation_error, fit, identification, profiles};
 use crate::report;
 use crate::simulation::{Compiled, Record};
 use crate::study::{ErrorDefinition, Role};
@@ -20,6 +20,9 @@ pub(super) struct Arguments {
     html: Option<PathBuf>,
     #[command(flatten)]
     search: SearchArguments,
+    /// Profile likelihood of these parameters: their intervals without linearisation (`all` for all)
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    profile: Vec<String>,
     /// Write what the fit knows about the parameters, for `--with` of another fit
     #[arg(long, value_name = "FILE")]
     save_result: Option<PathBuf>,
@@ -133,19 +136,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     if let Some(path) = &arguments.save_result {
         super::results::save(path, &fit)?;
     }
-    let result = identification(&fit.compiled, &fit.fitted, &fit.records.iter().collect::<Vec<_>>());
-    if let Some(path) = &arguments.html {
-        let page = report::page::identification(&result).map_err(|error| {
-            eprintln!("error: the page cannot be made: {error}");
-            Failed
-        })?;
-        write_whole(path, &page)?;
+    let mut result = identification(&fit.compiled, &fit.fitted, &fit.records.iter().collect::<Vec<_>>());
+    result.profiles = profiles_of(&session, &fit, &arguments.profile)?;
+    page(arguments.html.as_deref(), || report::page::identification(&result))?;
+    answer(study.format, || report::terminal::identification(&result), || report::json::identification(&result))
+}
+
+/// Profiles of the named parameters.
+fn profiles_of(session: &Session, fit: &FittedVariant, names: &[String]) -> Result<Vec<Profile>, Failed> {
+    let parameters = &fit.compiled.study.parameters;
+    let all = names.iter().any(|name| name == "all");
+    if !all {
+        known_parameters(&fit.compiled, names)?;
     }
-    match study.format {
-        Format::Text => print!("{}", report::terminal::identification(&result)),
-        Format::Json => println!("{}", super::output::json(report::json::identification(&result))?),
-    }
-    Ok(())
+    let indices: Vec<usize> = (0..parameters.len()).filter(|&j| all || names.contains(&parameters[j].name)).collect();
+    let estimation: Vec<&Record> = fit.records.iter().filter(|record| record.role == Role::Estimation).collect();
+    let known = confidence(&fit.compiled, &fit.fitted);
+    profiles(&fit.compiled, &fit.fitted, &known, &estimation, &indices)
+        .map_err(|diagnostic| session.fail(&[diagnostic]))
 }
 
 /// A variant fitted to its estimation records.

@@ -1,8 +1,8 @@
 //! `ident optimisers STUDY`
 
-use super::output::write_whole;
+use super::output::{answer, figure};
 use super::session::Session;
-use super::{Failed, Format, StudyArguments};
+use super::{Failed, StudyArguments};
 use crate::analyse::courses;
 use crate::report;
 use crate::simulation::Record;
@@ -37,12 +37,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     super::fit::known_parameters(&compiled, &arguments.parameters)?;
     let result = courses(&compiled, &estimation, &arguments.parameters, arguments.budget, arguments.seed)
         .map_err(|diagnostics| session.fail(&diagnostics))?;
-    if let Some(path) = &arguments.figure {
-        write_whole(path, &report::figure::courses(&result))?;
-    }
-    match study.format {
-        Format::Text => print!("{}", report::terminal::courses(&result)),
-        Format::Json => println!("{}", super::output::json(report::json::courses(&result))?),
-    }
-    Ok(())
+    figure(arguments.figure.as_deref(), || report::figure::courses(&result))?;
+    answer(study.format, || report::terminal::courses(&result), || report::json::courses(&result))
 }

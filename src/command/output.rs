@@ -1,6 +1,7 @@
 //! Files that appear whole or not at all; text on standard output.
 
-use super::Failed;
+use super::{Failed, Format};
+use crate::report::page::RenderError;
 use std::io::Write;
 use std::path::Path;
 
@@ -48,4 +49,32 @@ pub(super) fn json(document: Result<String, serde_json::Error>) -> Result<String
         eprintln!("error: the answer cannot be written as JSON: {error}");
         Failed
     })
+}
+
+/// Writes the page that was asked for.
+pub(super) fn page(path: Option<&Path>, make: impl FnOnce() -> Result<String, RenderError>) -> Result<(), Failed> {
+    let Some(path) = path else { return Ok(()) };
+    let page = make().map_err(|error| {
+        eprintln!("error: the page cannot be made: {error}");
+        Failed
+    })?;
+    write_whole(path, &page)
+}
+
+/// Writes the picture that was asked for.
+pub(super) fn figure(path: Option<&Path>, make: impl FnOnce() -> String) -> Result<(), Failed> {
+    path.map_or(Ok(()), |path| write_whole(path, &make()))
+}
+
+/// The answer on standard output, in the form that was asked for.
+pub(super) fn answer(
+    format: Format,
+    text: impl FnOnce() -> String,
+    document: impl FnOnce() -> Result<String, serde_json::Error>,
+) -> Result<(), Failed> {
+    match format {
+        Format::Text => show(&text()),
+        Format::Json => show(&(json(document())? + "\n")),
+    }
+    Ok(())
 }

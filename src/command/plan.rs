@@ -1,6 +1,6 @@
 //! `ident plan STUDY`
 
-use super::output::write_whole;
+use super::output::{answer, page};
 use super::session::Session;
 use super::{Failed, Format};
 use crate::analyse::{PlanOptions, plan};
@@ -60,13 +60,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
         super::results::values(path, parameters, &mut options.theta)?;
     }
     let result = plan(&compiled, &options).map_err(|what| wrong(&what))?;
-    if let Some(path) = &arguments.html {
-        let page = report::page::plan(&result).map_err(|error| wrong(&format!("the page cannot be made: {error}")))?;
-        write_whole(path, &page)?;
-    }
-    match arguments.format {
-        Format::Text => print!("{}", report::terminal::plan(&result)),
-        Format::Json => println!("{}", super::output::json(report::json::plan(&result))?),
-    }
-    Ok(())
+    page(arguments.html.as_deref(), || report::page::plan(&result))?;
+    answer(arguments.format, || report::terminal::plan(&result), || report::json::plan(&result))
 }

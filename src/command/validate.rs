@@ -1,9 +1,9 @@
 //! `ident validate STUDY`
 
 use super::fit::{SearchArguments, fit_variant};
-use super::output::write_whole;
+use super::output::{answer, page};
 use super::session::Session;
-use super::{Failed, Format, StudyArguments};
+use super::{Failed, StudyArguments};
 use crate::analyse::{MonteCarlo, Verdict, validity};
 use crate::identify::confidence;
 use crate::report;
@@ -41,17 +41,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     let confidence = confidence(&fit.compiled, &fit.fitted);
     let options = MonteCarlo { samples: arguments.samples, seed: arguments.seed };
     let result = validity(&fit.compiled, &fit.fitted, &confidence, options);
-    if let Some(path) = &arguments.html {
-        let page = report::page::validity(&result).map_err(|error| {
-            eprintln!("error: the page cannot be made: {error}");
-            Failed
-        })?;
-        write_whole(path, &page)?;
-    }
-    match study.format {
-        Format::Text => print!("{}", report::terminal::validity(&result)),
-        Format::Json => println!("{}", super::output::json(report::json::validity(&result))?),
-    }
+    page(arguments.html.as_deref(), || report::page::validity(&result))?;
+    answer(study.format, || report::terminal::validity(&result), || report::json::validity(&result))?;
     let answered = result.criteria.iter().all(|criterion| criterion.verdict != Verdict::CannotBeJudged);
     if answered { Ok(()) } else { Err(Failed) }
 }

@@ -1,7 +1,8 @@
 //! Other ways to the minimum, for comparison and for costs that Levenberg-Marquardt does not fit.
 
+use super::chosen::Chosen;
 use super::multi_start::latin_hypercube;
-use super::problem::{Bounds, LeastSquares};
+use super::problem::{Bounds, Control, LeastSquares, Progress};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
@@ -40,6 +41,8 @@ pub struct Search {
     pub history: Vec<(usize, f64)>,
     /// The search ended by itself, not by its budget.
     pub converged: bool,
+    /// The observer wished its end.
+    pub stopped: bool,
 }
 
 /// Relative change of the cost below which a search has converged.
@@ -55,15 +58,14 @@ pub(super) struct Counted<'a, P: ?Sized> {
     work: usize,
     best: (Vec<f64>, f64),
     history: Vec<(usize, f64)>,
+    /// Told of every improvement.
+    observer: &'a mut dyn FnMut(&Progress) -> Control,
+    stopped: bool,
 }
 
 impl<'a, P: LeastSquares + ?Sized> Counted<'a, P> {
-    fn new(problem: &'a mut P, bounds: &'a Bounds, budget: usize) -> Self {
-        Self { problem, bounds, budget, work: 0, best: (Vec::new(), f64::INFINITY), history: Vec::new() }
-    }
-
     fn exhausted(&self) -> bool {
-        self.work >= self.budget
+        self.stopped || self.work >= self.budget
     }
 
     fn theta(&self, x: &[f64]) -> Vec<f64> {
@@ -87,6 +89,9 @@ impl<'a, P: LeastSquares + ?Sized> Counted<'a, P> {
         if cost < self.best.1 {
             self.best = (self.theta(x), cost);
             self.history.push((self.work, cost));
+            let iteration = self.history.len();
+            let progress = Progress { iteration, theta: &self.best.0, cost, evaluations: self.work };
+            self.stopped |= (self.observer)(&progress) == Control::Stop;
         }
     }
 
@@ -126,7 +131,8 @@ impl<'a, P: LeastSquares + ?Sized> Counted<'a, P> {
             self.best.0 = start.to_vec();
         }
         self.history.push((self.work, self.best.1));
-        Search { theta: self.best.0, cost: self.best.1, history: self.history, converged }
+        let converged = converged && !self.stopped;
+        Search { theta: self.best.0, cost: self.best.1, history: self.history, converged, stopped: self.stopped }
     }
 }
 
@@ -140,7 +146,19 @@ pub fn search<P: LeastSquares + ?Sized>(
     budget: usize,
     seed: u64,
 ) -> Search {
-    let mut counted = Counted::new(problem, bounds, budget);
+    observed_search(Chosen { optimiser, budget, seed }, problem, start, bounds, &mut |_| Control::Continue)
+}
+
+/// As [`search`]; `observer` is told of every improvement and may end the search.
+pub fn observed_search<P: LeastSquares + ?Sized>(
+    Chosen { optimiser, budget, seed }: Chosen,
+    problem: &mut P,
+    start: &[f64],
+    bounds: &Bounds,
+    observer: &mut dyn FnMut(&Progress) -> Control,
+) -> Search {
+    let best = (Vec::new(), f64::INFINITY);
+    let mut counted = Counted { problem, bounds, budget, work: 0, best, history: Vec::new(), observer, stopped: false };
     let x = counted.scaled(start);
     let converged = match optimiser {
         Optimiser::LevenbergMarquardt => {

@@ -1,6 +1,6 @@
 //! The optimiser of one's choice with the same result as Levenberg-Marquardt's.
 
-use super::alternatives::{Optimiser, search};
+use super::alternatives::{Optimiser, observed_search};
 use super::constrained::{Constraints, constrained};
 use super::problem::{BoundState, Bounds, Control, Estimate, FitError, LeastSquares, Options, Progress, StopReason};
 
@@ -38,12 +38,10 @@ pub fn minimise<P: LeastSquares, C: Constraints>(
         return constrained(problem, constraints, start, bounds, options, observer);
     }
     let mut admitted = Admitted { problem, constraints };
-    let found = search(chosen.optimiser, &mut admitted, start, bounds, chosen.budget, chosen.seed);
+    let found = observed_search(chosen, &mut admitted, start, bounds, observer);
     let (residual, gradient) = admitted.problem.residual_and_gradient(&found.theta).map_err(FitError::StartFails)?;
     let cost = residual.iter().map(|value| value * value).sum();
     let evaluations = found.history.last().map_or(0, |(work, _)| *work);
-    let progress = Progress { iteration: found.history.len(), theta: &found.theta, cost, evaluations };
-    let interrupted = observer(&progress) == Control::Stop;
     let state = |j: usize| match found.theta[j] {
         value if value <= bounds.lower[j] => BoundState::AtLower,
         value if value >= bounds.upper[j] => BoundState::AtUpper,
@@ -56,7 +54,7 @@ pub fn minimise<P: LeastSquares, C: Constraints>(
         residual,
         gradient,
         cost_history: found.history.iter().map(|(_, cost)| *cost).collect(),
-        stop_reason: match (interrupted, found.converged) {
+        stop_reason: match (found.stopped, found.converged) {
             (true, _) => StopReason::Interrupted,
             (false, true) => StopReason::CostConverged,
             (false, false) => StopReason::EvaluationLimit,

@@ -15,7 +15,7 @@ mod prior;
 mod problem;
 mod step;
 
-pub use alternatives::{Optimiser, Search, search};
+pub use alternatives::{Optimiser, Search, observed_search, search};
 pub use chosen::{Chosen, minimise};
 pub use constrained::{Constraints, constrained};
 pub use cost::{ChannelCost, CostTree, magnitude_weight, noise_weight};

@@ -2,7 +2,7 @@
 
 use super::{EvaluationFailure, LeastSquares};
 
-/// One row `sum_j weight_j theta_j - target`, of variance one: a normal prior of one parameter, or a row of what an
+/// One row `sum_j weight_j theta_j - target`: a normal prior of one parameter, or a row of what an
 /// independent result knows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PriorRow {
@@ -11,12 +11,26 @@ pub struct PriorRow {
     pub target: f64,
     /// Taken from the linearisation of another result, whose undetermined directions turn with the parameters.
     pub linearised: bool,
+    /// Of the row's error: 1, or more where the row is scaled up beside data that count more than they know.
+    pub variance: f64,
 }
 
 impl PriorRow {
     /// A normal prior of parameter `index`.
     pub fn gaussian(index: usize, mean: f64, standard_deviation: f64) -> Self {
-        Self { weights: vec![(index, 1.0 / standard_deviation)], target: mean / standard_deviation, linearised: false }
+        Self {
+            weights: vec![(index, 1.0 / standard_deviation)],
+            target: mean / standard_deviation,
+            linearised: false,
+            variance: 1.0,
+        }
+    }
+
+    /// The same knowledge as a row whose error has this variance.
+    pub fn with_variance(&self, variance: f64) -> Self {
+        let factor = (variance / self.variance).sqrt();
+        let weights = self.weights.iter().map(|&(j, weight)| (j, factor * weight)).collect();
+        Self { weights, target: factor * self.target, linearised: self.linearised, variance }
     }
 
     pub fn residual(&self, theta: &[f64]) -> f64 {

@@ -85,7 +85,10 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     confidence.noise =
         levels.unwrap_or_else(|| noise::deviations(compiled, fitted, &gradient, &scales, RANK_THRESHOLD));
     let inverse = Covariance::new(&gradient, &scales, 1.0, None, RANK_THRESHOLD).map(|covariance| covariance.matrix);
-    let gamma = noise::gamma(fitted, &gradient, &models, &inverse.unwrap_or_else(|_| vec![0.0; count * count]));
+    let inverse = inverse.unwrap_or_else(|_| vec![0.0; count * count]);
+    let mut completed = models;
+    noise::complete(fitted, &mut completed, &inverse);
+    let gamma = noise::gamma(fitted, &gradient, &completed, &inverse);
     if let Ok(analysis) = identifiability(&gradient, &scales, &fitted.theta, &names, RANK_THRESHOLD) {
         confidence.undetermined = analysis.undetermined.iter().map(|direction| direction.description.clone()).collect();
         confidence.identifiability = analysis.measures;

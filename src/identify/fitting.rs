@@ -1,10 +1,12 @@
 //! The fit of one compiled study to its estimation records.
 
 use super::bands::bands;
+use super::confidence::RANK_THRESHOLD;
 use super::constraints::StudyConstraints;
 use super::definitions::{equation, filter, shooting_start};
 use super::errors::EquationFit;
 use super::knowledge::straightened;
+use super::noise::inflation;
 use super::problem::{Block, Problem};
 use super::weights::{Weighting, first_weights, residual_deviations};
 use super::whitening::whitened;
@@ -46,6 +48,18 @@ pub struct Settings {
     pub coloured_noise: bool,
     /// Steps in which the band of the prefilter is widened to that of the study (method 3).
     pub bands: usize,
+}
+
+impl Settings {
+    /// What is left of the allowed iterations.
+    fn after(&self, iterations: usize) -> Self {
+        let maximum_iterations = self.maximum_iterations.map(|limit| limit.saturating_sub(iterations));
+        Self { maximum_iterations, ..self.clone() }
+    }
+
+    fn exhausted(&self) -> bool {
+        self.maximum_iterations == Some(0)
+    }
 }
 
 /// A converged (or stopped) fit with what statistics need of it.
@@ -169,6 +183,7 @@ fn output(
     let mut history = Vec::new();
     for round in 0..=rounds {
         problem.weights.clone_from(&weighting.weights);
+        let settings = &settings.after(iterations);
         let searches = if round == 0 { settings.further_starts } else { 0 };
         let estimate = minimise(compiled, &mut problem, &start, settings, &rows, searches, observer)?;
         if round == 0 {
@@ -184,14 +199,25 @@ fn output(
         let residual = &estimate.residual[..problem.residual_count()];
         let next = residual_deviations(&weighting, &compiled.study, residual, &blocks, &gains, estimate.theta.len());
         let settled = next.largest_change(&weighting) < WEIGHT_CHANGE;
-        if round == rounds || settled || estimate.stop_reason == StopReason::Interrupted {
+        // Prior knowledge counts beside the data as it should although coloured noise makes the data's cost too large.
+        let factor = match rows.first() {
+            Some(_) if rounds > 0 => {
+                let here = finish(estimate.clone(), weighting.clone(), &problem, Vec::new(), iterations);
+                inflation(compiled, &here, RANK_THRESHOLD)
+            }
+            _ => 1.0,
+        };
+        let settled = settled && rows.first().is_none_or(|row| (factor / row.variance).ln().abs() < WEIGHT_CHANGE);
+        let ended = estimate.stop_reason == StopReason::Interrupted || settings.after(estimate.iterations).exhausted();
+        if round == rounds || settled || ended {
             let mut fitted = finish(estimate, weighting, &problem, history, iterations);
             (fitted.prior_rows, fitted.start_costs, fitted.bands) = (rows, start_costs, before);
-            if settings.coloured_noise && fitted.stop_reason != StopReason::Interrupted {
+            if settings.coloured_noise && !ended {
                 return whitened(compiled, problem, fitted, settings, observer);
             }
             return Ok(fitted);
         }
+        rows = rows.iter().map(|row| row.with_variance(factor)).collect();
         weighting = next;
     }
     Err(Diagnostic::error(Code::FIT_FAILED, "the fit ended without a result"))

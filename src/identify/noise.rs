@@ -3,7 +3,7 @@
 use super::fitting::Fitted;
 use crate::signal::AutoRegression;
 use crate::simulation::Compiled;
-use crate::statistics::{NoiseChannel, noise_variances};
+use crate::statistics::{Covariance, NoiseChannel, noise_variances};
 
 /// Orders of autoregressive models that are tried.
 const LARGEST_ORDER: usize = 24;
@@ -22,6 +22,8 @@ pub(super) struct NoiseModel {
     stride: usize,
     filter: AutoRegression,
     model: AutoRegression,
+    /// The share of the fitted parameters is given back, lag by lag.
+    complete: bool,
 }
 
 impl NoiseModel {
@@ -54,7 +56,7 @@ pub(super) fn models(fitted: &Fitted) -> Vec<NoiseModel> {
             }
             let views: Vec<&[f64]> = series.iter().map(Vec::as_slice).collect();
             let model = AutoRegression::choose_over(&views, residual.len() / stride, LARGEST_ORDER);
-            let mut noise = NoiseModel { stride, filter, model };
+            let mut noise = NoiseModel { stride, filter, model, complete: false };
             let square = residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64;
             let power = noise.power();
             if power > 0.0 {
@@ -92,7 +94,7 @@ fn every(values: &[f64], phase: usize, stride: usize) -> Vec<f64> {
 }
 
 /// Gamma = Phi^T S^T S Cov(D) S^T S Phi of method 3.30, p x p. `gradient`: N x p, weighted and filtered; rows after the last
-/// block (priors) count with variance one. The fitted parameters have taken their share of the residual, from which the models are:
+/// block are priors with variances of their own. The fitted parameters have taken their share of the residual, from which the models are:
 /// it is given back to the level (method 4.5 for coloured noise; `inverse` is Xi^+).
 pub(super) fn gamma(fitted: &Fitted, gradient: &[f64], models: &[NoiseModel], inverse: &[f64]) -> Vec<f64> {
     let count = fitted.theta.len();
@@ -118,13 +120,120 @@ pub(super) fn gamma(fitted: &Fitted, gradient: &[f64], models: &[NoiseModel], in
     let energy: f64 = fitted.blocks.iter().zip(models).map(|(b, noise)| b.rows.len() as f64 * noise.power()).sum();
     let taken: f64 = (0..count * count).map(|k| inverse[k] * gamma[k]).sum();
     let left = (1.0 - taken / energy).clamp(LEAST_LEFT, 1.0);
-    if energy > 0.0 {
+    if energy > 0.0 && !models.iter().all(|noise| noise.complete) {
         gamma.iter_mut().for_each(|value| *value /= left);
     }
     let mut add = |columns: &[Vec<f64>], factor: f64| add_gram(&mut gamma, columns, factor);
     let rest: Vec<Vec<f64>> = (0..count).map(|j| column(j, fitted.residual.len()..rows).to_vec()).collect();
+    let deviations = |row: usize| fitted.prior_rows.get(row).map_or(1.0, |prior| prior.variance.sqrt());
+    let rest: Vec<Vec<f64>> = rest
+        .into_iter()
+        .map(|own| own.iter().enumerate().map(|(row, value)| deviations(row) * value).collect())
+        .collect();
     add(&rest, 1.0);
     gamma
+}
+
+/// Factor by which the data's cost counts more than it knows, because coloured noise is weighted as if it were white: mean of the
+/// parameters' variances over those for white noise of the same level. At least 1.
+pub(super) fn inflation(compiled: &Compiled, fitted: &Fitted, threshold: f64) -> f64 {
+    let count = fitted.theta.len();
+    let scales: Vec<f64> = compiled.study.parameters.iter().map(crate::study::Parameter::scale).collect();
+    let alone = Fitted { prior_rows: Vec::new(), ..fitted.clone() };
+    let level = fitted.cost() / fitted.residual.len().max(1) as f64;
+    let Ok(covariance) = Covariance::new(&alone.gradient, &scales, 1.0, None, threshold) else { return 1.0 };
+    let gamma = gamma(&alone, &alone.gradient, &models(&alone), &covariance.matrix);
+    let trace: f64 = (0..count * count).map(|k| covariance.matrix[k] * gamma[k]).sum();
+    let rank = count.saturating_sub(covariance.undetermined.len()).max(1);
+    let factor = trace / rank as f64 / level;
+    if factor.is_finite() { factor.max(1.0) } else { 1.0 }
+}
+
+/// Longest lag of the models' autocovariance that the completion takes into account.
+const LONGEST: usize = 400;
+
+/// Gives the models back what the fitted parameters have taken of the noise (method 4.5 lag by lag): it is missing at the very
+/// frequencies at which the parameters are determined, where an average share would be too little. With the residual
+/// `(I - P) d`, `P = Phi Xi^+ Phi^T`, its autocovariance is that of the noise d less
+/// `P R + R P - P R P` on average along the diagonals. Records behind a prefilter keep the average share.
+pub(super) fn complete(fitted: &Fitted, models: &mut [NoiseModel], inverse: &[f64]) {
+    let filtered = |record: usize| fitted.filters[record].design().is_some();
+    if fitted.blocks.iter().any(|block| filtered(block.record)) {
+        return;
+    }
+    let (count, rows) = (fitted.theta.len(), fitted.residual.len());
+    let column =
+        |j: usize, range: &std::ops::Range<usize>| &fitted.gradient[j * rows + range.start..j * rows + range.end];
+    let covariances: Vec<Vec<f64>> = models.iter().map(|noise| autocovariance(&noise.model)).collect();
+    // R Phi per block, and Phi^T R Phi of all.
+    let shaped: Vec<Vec<Vec<f64>>> = fitted
+        .blocks
+        .iter()
+        .zip(&covariances)
+        .map(|(block, covariance)| (0..count).map(|j| toeplitz(covariance, column(j, &block.rows))).collect())
+        .collect();
+    let mut gamma = vec![0.0; count * count];
+    for (block, own) in fitted.blocks.iter().zip(&shaped) {
+        for (j, image) in own.iter().enumerate() {
+            for i in 0..count {
+                gamma[j * count + i] += column(i, &block.rows).iter().zip(image).map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+    }
+    for (((block, own), covariance), noise) in
+        fitted.blocks.iter().zip(&shaped).zip(&covariances).zip(models.iter_mut())
+    {
+        let order = noise.model.order();
+        let length = block.rows.len();
+        let phi: Vec<&[f64]> = (0..count).map(|j| column(j, &block.rows)).collect();
+        // u = Phi Xi^+ - as columns; then P R = u (R Phi)^T, and P R P = u Gamma u^T.
+        let mixed = |columns: &[&[f64]], matrix: &[f64]| -> Vec<Vec<f64>> {
+            (0..count)
+                .map(|j| {
+                    let mut sum = vec![0.0; length];
+                    for (i, own) in columns.iter().enumerate() {
+                        let factor = matrix[j * count + i];
+                        sum.iter_mut().zip(*own).for_each(|(value, entry)| *value += factor * entry);
+                    }
+                    sum
+                })
+                .collect()
+        };
+        let u = mixed(&phi, inverse);
+        let views: Vec<&[f64]> = u.iter().map(Vec::as_slice).collect();
+        let through = mixed(&views, &gamma);
+        let completed: Vec<f64> = (0..=order)
+            .map(|lag| {
+                let along = |a: &[f64], b: &[f64]| a.iter().zip(&b[lag..]).map(|(x, y)| x * y).sum::<f64>();
+                let taken: f64 =
+                    (0..count).map(|j| along(&u[j], &own[j]) + along(&own[j], &u[j]) - along(&through[j], &u[j])).sum();
+                covariance.get(lag).copied().unwrap_or(0.0) + taken / (length - lag).max(1) as f64
+            })
+            .collect();
+        let model = AutoRegression::from_autocovariance(&completed);
+        if model.order() == order && model.variance > 0.0 {
+            (noise.model, noise.complete) = (model, true);
+        }
+    }
+}
+
+/// Of the process, up to the lag where it has decayed.
+fn autocovariance(model: &AutoRegression) -> Vec<f64> {
+    let impulse = model.colour(&[1.0]);
+    let lags = impulse.len().min(LONGEST);
+    (0..lags).map(|lag| impulse.iter().zip(&impulse[lag..]).map(|(a, b)| a * b).sum()).collect()
+}
+
+/// R x with the Toeplitz matrix R of an autocovariance.
+fn toeplitz(covariance: &[f64], x: &[f64]) -> Vec<f64> {
+    let mut image: Vec<f64> = x.iter().map(|value| covariance[0] * value).collect();
+    for (lag, value) in covariance.iter().enumerate().skip(1).take(x.len().saturating_sub(1)) {
+        for t in lag..x.len() {
+            image[t] += value * x[t - lag];
+            image[t - lag] += value * x[t];
+        }
+    }
+    image
 }
 
 fn add_gram(gamma: &mut [f64], columns: &[Vec<f64>], factor: f64) {

@@ -33,6 +33,9 @@ pub fn identification(compiled: &Compiled, fitted: &Fitted, records: &[&Record])
         variant: compiled.study.variant.clone(),
         parameters: parameters(compiled, fitted, &confidence),
         correlation: confidence.correlation.clone(),
+        covariance: covariance(compiled, &confidence),
+        freedom: confidence.freedom(),
+        profiles: Vec::new(),
         singular_values: confidence.singular_values.clone(),
         undetermined: confidence.undetermined.clone(),
         records: fits,
@@ -134,6 +137,15 @@ fn parameter_remarks(compiled: &Compiled, fitted: &Fitted, confidence: &Confiden
         remarks.push(format!("{} simulations failed and shortened a step", fitted.failed_simulations));
     }
     remarks
+}
+
+fn covariance(compiled: &Compiled, confidence: &Confidence) -> Vec<Vec<f64>> {
+    let parameters = &compiled.study.parameters;
+    let units = |j: usize| parameters[j].unit.difference_to_si(1.0);
+    let count = parameters.len();
+    let entry =
+        |i: usize, j: usize| confidence.covariance.get(j * count + i).map_or(0.0, |v| v / (units(i) * units(j)));
+    (0..count).map(|i| (0..count).map(|j| entry(i, j)).collect()).collect()
 }
 
 /// The way to the result: bands, noise models.

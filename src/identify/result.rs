@@ -1,6 +1,7 @@
 //! What an identification found. Values of parameters and channels are in the unit the study wrote; times in s.
 
 use super::errors::ErrorReport;
+use super::profile::Profile;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -11,6 +12,13 @@ pub struct Identification {
     pub parameters: Vec<ParameterEstimate>,
     /// Correlation matrix of the estimates, row-major, in parameter order; NaN-free (0 where undetermined).
     pub correlation: Vec<Vec<f64>>,
+    /// Covariance matrix of the estimates in their units, row-major, in parameter order; finite part only.
+    pub covariance: Vec<Vec<f64>>,
+    /// Degrees of freedom of the noise estimate behind the intervals.
+    pub freedom: f64,
+    /// Profile likelihoods that were asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub profiles: Vec<Profile>,
     /// Singular values of the weighted gradient scaled by the parameter bounds, descending.
     pub singular_values: Vec<f64>,
     /// Directions the data do not determine, in words.

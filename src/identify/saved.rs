@@ -131,7 +131,7 @@ impl SavedResult {
                     entries.filter_map(|(entry, &i)| Some((targets[i]?, value.sqrt() * entry / scales[i]))).collect();
                 let at = kept.iter().map(|&i| values[i]);
                 let target = weights.iter().zip(at).map(|((_, weight), value)| weight * value).sum();
-                PriorRow { weights, target, linearised: true }
+                PriorRow { weights, target, linearised: true, variance: 1.0 }
             })
             .collect())
     }

@@ -3,7 +3,7 @@
 use super::fitting::{Fitted, Settings, finish, search_once};
 use super::problem::Problem;
 use crate::diagnostics::{Code, Diagnostic};
-use crate::fit::{Control, LeastSquares, Progress, StopReason};
+use crate::fit::{Control, LeastSquares, PriorRow, Progress, StopReason};
 use crate::signal::AutoRegression;
 use crate::simulation::Compiled;
 use crate::study::Parameter;
@@ -28,6 +28,8 @@ pub(super) fn whitened(
 ) -> Result<Fitted, Diagnostic> {
     let scales: Vec<f64> = compiled.study.parameters.iter().map(Parameter::scale).collect();
     let blocks = problem.blocks();
+    // Whitened data count as much as they know: so does prior knowledge.
+    let rows: Vec<PriorRow> = white.prior_rows.iter().map(|row| row.with_variance(1.0)).collect();
     let mut residual = white.residual.clone();
     let mut theta = white.theta.clone();
     let mut iterations = white.iterations;
@@ -40,7 +42,7 @@ pub(super) fn whitened(
             })
             .collect();
         problem.whitening = models;
-        let estimate = search_once(compiled, &mut problem, &theta, settings, &white.prior_rows, observer)?;
+        let estimate = search_once(compiled, &mut problem, &theta, settings, &rows, observer)?;
         iterations += estimate.iterations;
         let moved = estimate.theta.iter().zip(&theta).zip(&scales).map(|((a, b), scale)| (a - b).abs() / scale);
         let settled = moved.fold(0.0, f64::max) < SETTLED;
@@ -51,7 +53,7 @@ pub(super) fn whitened(
             fitted.noise_levels = Some(levels(&problem, &white));
             fitted.whitening_orders =
                 problem.whitening.iter().map(|model| model.as_ref().map_or(0, AutoRegression::order)).collect();
-            (fitted.prior_rows, fitted.start_costs, fitted.bands) = (white.prior_rows, white.start_costs, white.bands);
+            (fitted.prior_rows, fitted.start_costs, fitted.bands) = (rows, white.start_costs, white.bands);
             return Ok(fitted);
         }
         let models = std::mem::take(&mut problem.whitening);

@@ -107,15 +107,53 @@ fn once(compiled: &Compiled, record: &Record, start: &[f64], truth: &[f64]) -> (
     ((0..truth.len()).map(holds).collect(), noise)
 }
 
-/// The standard error of a coverage of 95 % is 1 % per parameter.
+/// A coverage of 95 % has a standard error of 0.97 % in 500 repetitions: the mean over a study's parameters is asserted to lie in
+/// 93 to 97 %, each parameter by itself within three standard errors (2000 repetitions with another seed gave 0.934 to 0.955).
 fn assert_honest(case: &Case) {
     let result = repeat(case);
     let mean = result.coverage.iter().sum::<f64>() / result.coverage.len() as f64;
     let shown = format!("{}: {:?} {:?}, noise {:?}", case.study, result.names, result.coverage, result.variance_ratio);
     println!("{shown}");
     assert!((0.93..=0.97).contains(&mean), "{shown}");
-    assert!(result.coverage.iter().all(|share| (0.92..=0.98).contains(share)), "{shown}");
+    let error = (0.95 * 0.05 / REPETITIONS as f64).sqrt();
+    assert!(result.coverage.iter().all(|share| (share - 0.95).abs() <= 3.0 * error), "{shown}");
     assert!(result.variance_ratio.iter().all(|ratio| (ratio - 1.0).abs() < 0.02), "{shown}");
+}
+
+/// One channel has its noise above the band of the motion, the other within it, both of the same deviation: weights that know the
+/// colour trust the first, and the intervals say how much better that is.
+#[test]
+fn weights_for_coloured_noise_make_better_estimates() {
+    const RUNS: u64 = 100;
+    let (compiled, records) = compiled(&loaded("spring_slide"));
+    let record = records[0].part(0..SAMPLES, "short");
+    let truth: Vec<f64> = compiled.study.parameters.iter().map(|parameter| parameter.start).collect();
+    let exact = simulate(&compiled, &record, &truth, Gradient::None).expect("the truth can be simulated").channels;
+    let outcomes: Vec<[(f64, bool); 2]> = (0..RUNS)
+        .into_par_iter()
+        .map(|run| {
+            let mut stream = NormalStream::new(33, run);
+            let mut noisy = record.clone();
+            for ((measured, channel), slope) in noisy.measured.iter_mut().zip(&exact).zip([-0.9, 0.9]) {
+                let noise = Colour::Coloured(slope, 0.0).noise(&mut stream, channel.len());
+                let deviation = NOISE * deviation(channel);
+                *measured = channel.iter().zip(noise).map(|(value, e)| value + deviation * e).collect();
+            }
+            [false, true].map(|coloured_noise| {
+                let settings = Settings { coloured_noise, ..Settings::default() };
+                let fitted = fit(&compiled, &[&noisy], &settings, &mut |_| Control::Continue).expect("a fit");
+                let known = confidence(&compiled, &fitted);
+                let (low, high) = known.interval(1).expect("determined");
+                (fitted.theta[1] / truth[1] - 1.0, (low..=high).contains(&truth[1]))
+            })
+        })
+        .collect();
+    let scatter = |way: usize| outcomes.iter().map(|run| run[way].0.powi(2)).sum::<f64>().sqrt();
+    let held = outcomes.iter().filter(|run| run[1].1).count();
+    println!("{} {} {held}", scatter(0), scatter(1));
+    assert!(scatter(1) < 0.7 * scatter(0), "{} {}", scatter(0), scatter(1));
+    // 95 of 100 within three standard errors.
+    assert!((88..=100).contains(&held), "{held}");
 }
 
 const FAST: &str = "filter { lowpass butterworth pass 14 Hz (2 dB) stop 28 Hz (20 dB) zero_phase }";

@@ -124,6 +124,9 @@ pub fn identification(variant: &str, parameters: Vec<ParameterEstimate>, records
                     .collect()
             })
             .collect(),
+        covariance: (0..count).map(|i| (0..count).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect(),
+        freedom: 40.0,
+        profiles: vec![],
         singular_values: (0..count).map(|index| 310.0 * 0.21f64.powi(index as i32)).collect(),
         undetermined: vec![],
         estimation_discrepancy,

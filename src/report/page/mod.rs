@@ -4,6 +4,7 @@
 //! scripts run (uPlot, licence beside it in `vendor/uplot`). *Must not happen here*: files, judgements.
 
 mod anatomy;
+mod certainty;
 mod discrepancy;
 mod histories;
 mod missing;

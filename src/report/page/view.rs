@@ -1,6 +1,7 @@
 //! What the templates show, as finished words and pictures.
 
 use super::anatomy::{self, AnatomyRow};
+use super::certainty::{self, CertaintyView};
 use super::discrepancy::{self, TreeRow};
 use super::histories::{self, Curve, RecordView};
 use super::missing::{self, MissingView};
@@ -80,6 +81,8 @@ pub struct FitPage {
     title: String,
     figures: Vec<KeyFigure>,
     remarks: Vec<String>,
+    certainty: Option<CertaintyView>,
+    error: Vec<String>,
     #[serde(flatten)]
     fits: FitsView,
 }
@@ -144,8 +147,22 @@ pub fn identification(fit: &Identification) -> FitPage {
         title: format!("Fit of variant {}", fit.variant),
         figures: discrepancy_figures(fit, None),
         remarks: fit.remarks.clone(),
+        certainty: certainty::view(fit),
+        error: error_lines(fit),
         fits: fits(&fit_curves(fit)),
     }
+}
+
+/// What counted as error, and why nothing else did.
+fn error_lines(fit: &Identification) -> Vec<String> {
+    let error = &fit.error;
+    let used = format!("{}: {}", error.used, error.reason);
+    let noise = error.process_noise.iter();
+    let noise = noise.map(|(state, level)| {
+        format!("process noise on {state}: {} (SI, per root of Hz)", number::significant(*level, 3))
+    });
+    let others = error.others.iter().map(|other| format!("not {}: {}", other.name, other.why));
+    std::iter::once(used).chain(noise).chain(others).collect()
 }
 
 pub fn comparison(variants: &[Identification]) -> ComparisonPage {

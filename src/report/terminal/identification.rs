@@ -13,6 +13,7 @@ pub fn text(fit: &Identification, colour: Colour) -> String {
     discrepancy_section(&mut sheet, fit, None);
     channel_section(&mut sheet, fit);
     parameter_section(&mut sheet, fit, "Parameters");
+    profile_section(&mut sheet, fit);
     work_section(&mut sheet, fit);
     remark_section(&mut sheet, &fit.remarks);
     sheet.finish()
@@ -131,6 +132,33 @@ pub fn parameter_section(sheet: &mut Sheet, fit: &Identification, title: &str) {
     for direction in &fit.undetermined {
         sheet.item(&format!("not determined by the data: {direction}"));
     }
+}
+
+/// Intervals by profile likelihood beside those by linearisation.
+fn profile_section(sheet: &mut Sheet, fit: &Identification) {
+    if fit.profiles.is_empty() {
+        return;
+    }
+    sheet.heading("Profile likelihood (95 % intervals, all other parameters following)");
+    let mut table = Table::new(&[
+        ("name", Lean::Left),
+        ("lower", Lean::Right),
+        ("upper", Lean::Right),
+        ("unit", Lean::Left),
+        ("by linearisation", Lean::Left),
+    ]);
+    for profile in &fit.profiles {
+        let end = |value: Option<f64>| value.map_or("open".into(), |value| number::significant(value, 4));
+        let linear = fit.parameters.iter().find(|parameter| parameter.name == profile.parameter);
+        table.row(vec![
+            profile.parameter.clone(),
+            end(profile.lower),
+            end(profile.upper),
+            profile.unit.clone(),
+            linear.map_or(String::new(), |parameter| number::interval_text(parameter.interval)),
+        ]);
+    }
+    sheet.table(&table, 2);
 }
 
 /// `0 .. 100`, as short as the bounds are.

@@ -1,0 +1,71 @@
+//! Speed-up by threads: several searches, several experiments, Monte Carlo samples, on one thread and on all. The digits are the
+//! same, which is checked on the way.
+//!
+//! ```sh
+//! cargo run --release --example speedup
+//! ```
+
+use ident::analyse::{MonteCarlo, validity};
+use ident::fit::Control;
+use ident::identify::{Settings, confidence, fit};
+use ident::simulation::{Compiled, Record, prepare};
+use ident::study::{self, Role};
+use std::path::Path;
+use std::time::Instant;
+
+fn prepared(name: &str) -> (Compiled, Vec<Record>) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies").join(name).join(format!("{name}.ident"));
+    let loaded = study::load(&path);
+    let study = study::check(&loaded, None).expect("a study without errors").study;
+    let (records, _) = prepare(&study, &loaded.directory, &[]);
+    let records = records.into_iter().filter(|record| record.role == Role::Estimation).collect();
+    (Compiled::new(study).expect("a mechanism"), records)
+}
+
+/// All digits of the parameters after a fit.
+fn fitted(compiled: &Compiled, records: &[&Record], further_starts: usize) -> Vec<u64> {
+    let settings = Settings { further_starts, seed: 1, ..Settings::default() };
+    let fitted = fit(compiled, records, &settings, &mut |_| Control::Continue).expect("a fit");
+    fitted.theta.iter().map(|value| value.to_bits()).collect()
+}
+
+fn timed(threads: usize, work: &(dyn Fn() -> Vec<u64> + Sync)) -> (f64, Vec<u64>) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    pool.install(|| {
+        let begin = Instant::now();
+        let digits = work();
+        (begin.elapsed().as_secs_f64(), digits)
+    })
+}
+
+fn main() {
+    let threads = std::thread::available_parallelism().map_or(2, usize::from).max(2);
+    let (vehicle, vehicle_records) = prepared("quarter_vehicle");
+    let parts: Vec<Record> = (0..4)
+        .map(|k| {
+            let count = vehicle_records[0].sample_count();
+            vehicle_records[0].part(k * count / 4..(k + 1) * count / 4, "part")
+        })
+        .collect();
+    let (springs, springs_records) = prepared("series_springs");
+    let springs_fit =
+        fit(&springs, &springs_records.iter().collect::<Vec<_>>(), &Settings::default(), &mut |_| Control::Continue)
+            .expect("a fit");
+    let known = confidence(&springs, &springs_fit);
+    let starts = || fitted(&vehicle, &vehicle_records.iter().collect::<Vec<_>>(), 7);
+    let experiments = || fitted(&vehicle, &parts.iter().collect::<Vec<_>>(), 0);
+    let samples = || {
+        let result = validity(&springs, &springs_fit, &known, MonteCarlo { samples: 2000, seed: 1 });
+        let deviations = result.criteria.iter().filter_map(|criterion| criterion.by_monte_carlo);
+        deviations.map(|spread| spread.standard_deviation.to_bits()).collect()
+    };
+    println!("{:<28} {:>10} {:>10} {:>9}", "", "1 thread", format!("{threads} threads"), "speed-up");
+    let works: [(&str, &(dyn Fn() -> Vec<u64> + Sync)); 3] =
+        [("8 searches", &starts), ("4 experiments", &experiments), ("2000 Monte Carlo samples", &samples)];
+    for (name, work) in works {
+        let (alone, digits) = timed(1, work);
+        let (together, same) = timed(threads, work);
+        assert_eq!(digits, same, "{name}: threads changed a digit");
+        println!("{name:<28} {alone:>8.2} s {together:>8.2} s {:>9.2}", alone / together);
+    }
+}

@@ -1,0 +1,163 @@
+//! `ident fit` as users run it: interrupted and resumed, results saved and combined, optimisers, threads.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+fn study(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("studies").join(name).join(format!("{name}.ident"))
+}
+
+fn command(arguments: &[&str], study: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ident"));
+    command.arg(arguments[0]).arg(study).args(&arguments[1..]);
+    command
+}
+
+fn run(arguments: &[&str], study: &Path) -> Output {
+    command(arguments, study).output().expect("the program starts")
+}
+
+/// The `result` of a run with `--format json`.
+fn answer(arguments: &[&str], study: &Path) -> Value {
+    let output = run(&[arguments, &["--format", "json", "--quiet"]].concat(), study);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut answer: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    answer["result"].take()
+}
+
+fn value(result: &Value, name: &str, field: &str) -> f64 {
+    let parameters = result["parameters"].as_array().expect("parameters");
+    let found = parameters.iter().find(|parameter| parameter["name"] == name).expect("the parameter");
+    found[field].as_f64().expect("a number")
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a path")
+}
+
+/// A long search is interrupted by the signal of Ctrl-C: its file holds the best so far, whole, and a later run goes on from there.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_fit_is_resumed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let kept = folder.path().join("progress.json");
+    let search = ["fit", "--resume", text(&kept), "--optimiser", "simplex", "--budget", "1000000"];
+    let mut child = command(&search, &study("quarter_vehicle"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    let begin = Instant::now();
+    let cost = || {
+        let text = std::fs::read_to_string(&kept).ok()?;
+        serde_json::from_str::<Value>(&text).expect("a whole file at any time")["cost"].as_f64()
+    };
+    // The start is the first best; it must have been bettered.
+    let mut start = None;
+    while begin.elapsed() < Duration::from_secs(120) {
+        let now = cost();
+        start = start.or(now);
+        if now.zip(start).is_some_and(|(now, start)| now < start) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("a signal");
+    assert!(killed.success());
+    assert!(!child.wait().expect("an end").success(), "an interrupted fit has not answered");
+    let best: Value = serde_json::from_str(&std::fs::read_to_string(&kept).expect("kept")).expect("a whole file");
+    assert_eq!(best["schema"], "ident.progress/1");
+    let stiffness = best["parameters"]["c_tyre"].as_f64().expect("SI");
+    assert!((100e3..=300e3).contains(&stiffness));
+    // The next run starts there, not at the study's start.
+    let first =
+        |arguments: &[&str]| answer(arguments, &study("quarter_vehicle"))["cost_history"][0].as_f64().expect("a cost");
+    let (resumed, fresh) = (first(&["fit", "--resume", text(&kept), "--steps", "1"]), first(&["fit", "--steps", "1"]));
+    assert!(resumed < fresh, "{resumed} {fresh}");
+}
+
+/// In two parts with a step limit as in one go.
+#[test]
+fn steps_add_up() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let kept = folder.path().join("progress.json");
+    let part = answer(&["fit", "--resume", text(&kept), "--steps", "2"], &study("spring_slide"));
+    let stopped = part["remarks"].as_array().expect("remarks").iter().any(|r| r.to_string().contains("stopped early"));
+    assert!(stopped, "{}", part["remarks"]);
+    let rest = answer(&["fit", "--resume", text(&kept)], &study("spring_slide"));
+    let whole = answer(&["fit"], &study("spring_slide"));
+    for name in ["m_slider", "c_return", "d_slide"] {
+        let (a, b) = (value(&rest, name, "value"), value(&whole, name, "value"));
+        assert!((a / b - 1.0).abs() < 1e-4, "{name}: {a} {b}");
+    }
+    std::fs::write(&kept, "{").expect("written");
+    assert!(!run(&["fit", "--resume", text(&kept)], &study("spring_slide")).status.success());
+}
+
+/// What a fit knows, taken into another fit of the same kind of test: half the variance.
+#[test]
+fn a_saved_result_helps_another_fit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let saved = folder.path().join("result.json");
+    let alone = answer(&["fit", "--save-result", text(&saved)], &study("spring_slide"));
+    let document: Value = serde_json::from_str(&std::fs::read_to_string(&saved).expect("saved")).expect("JSON");
+    assert_eq!(
+        (document["schema"].as_str(), document["records"][0].as_str()),
+        (Some("ident.result/1"), Some("shaking"))
+    );
+    let both = answer(&["fit", "--with", text(&saved)], &study("spring_slide"));
+    let ratio = value(&both, "c_return", "standard_deviation") / value(&alone, "c_return", "standard_deviation");
+    assert!((ratio * 2f64.sqrt() - 1.0).abs() < 0.1, "{ratio}");
+}
+
+/// Every optimiser, every band and a start by equation error end at the same parameters.
+#[test]
+fn all_ways_lead_to_the_same_minimum() {
+    let plain = answer(&["fit"], &study("spring_slide"));
+    let ways: [&[&str]; 4] = [
+        &["fit", "--optimiser", "sequential"],
+        &["fit", "--optimiser", "simplex"],
+        &["fit", "--bands", "3"],
+        &["fit", "--start", "equation"],
+    ];
+    for way in ways {
+        let other = answer(way, &study("spring_slide"));
+        for name in ["m_slider", "c_return", "d_slide"] {
+            let (a, b) = (value(&other, name, "value"), value(&plain, name, "value"));
+            let deviation = value(&plain, name, "standard_deviation");
+            assert!((a - b).abs() < 0.05 * deviation, "{way:?} {name}: {a} {b}");
+        }
+    }
+}
+
+/// The profile's ends are those of the linearisation where the model is nearly linear.
+#[test]
+fn profiles_agree_with_the_linearisation_where_it_holds() {
+    let result = answer(&["fit", "--profile", "c_return,d_slide"], &study("spring_slide"));
+    let profiles = result["profiles"].as_array().expect("profiles");
+    assert_eq!(profiles.len(), 2);
+    for profile in profiles {
+        let name = profile["parameter"].as_str().expect("a name");
+        let deviation = value(&result, name, "standard_deviation");
+        let interval = &result["parameters"]
+            .as_array()
+            .expect("parameters")
+            .iter()
+            .find(|p| p["name"] == name)
+            .expect("it")["interval"];
+        for (end, linear) in [(&profile["lower"], &interval[0]), (&profile["upper"], &interval[1])] {
+            let (end, linear) = (end.as_f64().expect("closed"), linear.as_f64().expect("a number"));
+            assert!((end - linear).abs() < 0.1 * deviation, "{name}: {end} {linear}");
+        }
+    }
+    assert!(!run(&["fit", "--profile", "nothing"], &study("spring_slide")).status.success());
+}
+
+/// Several searches, all digits the same on one thread and on two.
+#[test]
+fn threads_do_not_change_a_digit_of_a_fit() {
+    let on = |threads: &str| answer(&["fit", "--starts", "4", "--threads", threads], &study("spring_slide"));
+    assert_eq!(on("1"), on("2"));
+}
