@@ -2,9 +2,9 @@
 
 use super::articulated::Accelerated;
 use super::forces::{Effect, ForceGeometry};
-use super::kinematics::FrameMotion;
+use super::kinematics::{self, FrameMotion};
 use super::multipliers::Loops;
-use super::topology::Tree;
+use super::topology::{Seat, Tree};
 use crate::expression::vector::{self, Vector};
 use crate::expression::{Graph, Node, Symbol};
 use crate::study::{AxisMotion, ForcePlace, ReactionQuantity, Study};
@@ -50,9 +50,23 @@ fn carried_reaction(
 ) -> Vector {
     let Some(&link) = tree.links_of_joint[reaction.joint].last() else { return vector::zero(graph) };
     let transmitted = accelerated[link].transmitted;
-    let local = if reaction.is_moment { transmitted.moment } else { transmitted.force };
-    let on_outer = vector::apply(graph, frames[link].orientation, local);
-    if tree.is_reversed(study, reaction.joint) { vector::negate(graph, on_outer) } else { on_outer }
+    let [force, moment] =
+        [transmitted.force, transmitted.moment].map(|local| vector::apply(graph, frames[link].orientation, local));
+    let on_outer = if reaction.is_moment { moment } else { force };
+    if !tree.is_reversed(study, reaction.joint) {
+        return on_outer;
+    }
+    // What is known acts on the parent, at its attachment.
+    let mut on_child = vector::negate(graph, on_outer);
+    if reaction.is_moment {
+        let origin = Seat { link: Some(link), offset: vector::zero(graph), rotation: vector::identity(graph) };
+        let child = tree.place(graph, &study.joints[reaction.joint].child);
+        let [origin, child] = [origin, child].map(|place| kinematics::point_position(graph, frames, place));
+        let arm = vector::subtract(graph, child, origin);
+        let shifted = vector::cross(graph, arm, force);
+        on_child = vector::add(graph, on_child, shifted);
+    }
+    on_child
 }
 
 fn closing_reaction(

@@ -126,10 +126,8 @@ fn cantilever_bends_as_the_beam_does() {
     let exact = force * LENGTH.powi(3) / (3.0 * STIFFNESS);
     for count in [1, 2, 4, 8] {
         let own = &run(&text(count), &[("beam.csv", clamped_file(8))])[0];
-        let series: f64 = (1..=count)
-            .map(|number| clamped(number))
-            .map(|(b, [end, ..])| force * end * end / (TAU * frequency(b)).powi(2))
-            .sum();
+        let series: f64 =
+            (1..=count).map(clamped).map(|(b, [end, ..])| force * end * end / (TAU * frequency(b)).powi(2)).sum();
         assert_near(own["z"][2], series, 1e-6);
         let missing = (exact - own["z"][2]) / exact;
         println!("{count} modes: {missing:.1e} of the deflection is missing");
@@ -319,11 +317,11 @@ impl Lumps {
             text.push(',');
         }
         text.pop();
-        for k in 0..MODES {
+        for (k, frequency) in FREQUENCIES.iter().enumerate() {
             let parts = || self.masses.iter().zip(&self.places).zip(&self.shapes[k]);
             let take: Vector3<f64> = parts().map(|((m, _), s)| *m * s).sum();
             let moment: Vector3<f64> = parts().map(|((m, r), s)| *m * r.cross(s)).sum();
-            text += &format!("\n{},0,1", FREQUENCIES[k]);
+            text += &format!("\n{frequency},0,1");
             for value in
                 [take, moment, self.root[k][0], self.root[k][1], self.tip[k][0], self.tip[k][1]].iter().flatten()
             {

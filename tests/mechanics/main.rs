@@ -6,6 +6,7 @@ mod derivatives;
 mod elastic;
 mod faults;
 mod maximal;
+mod newton_euler;
 mod pendulum;
 mod run;
 mod spatial;
