@@ -41,8 +41,10 @@ fn error_of_sensitivities(own: &Trajectory, reference: &Trajectory, theta: &[f64
     worst
 }
 
-/// Slope jumps of the dampers make sensitivities jump: explicit steps at tighter tolerances shrink to rounding there.
-const REFERENCE_TOLERANCE: f64 = 1e-10;
+/// Tolerances of the references, far below the errors asked for. Slope jumps of the dampers are kinks of the sensitivities, at
+/// which explicit steps at tight tolerances become very short.
+const REFERENCE: f64 = 1e-10;
+const GRADIENT_REFERENCE: f64 = 1e-8;
 
 struct Peers {
     call: f64,
@@ -51,7 +53,7 @@ struct Peers {
 }
 
 fn problem(name: &str, text: fn(f64) -> String, rate: f64, wanted: (f64, f64), peers: &Peers) {
-    let compiled = compile(&text(REFERENCE_TOLERANCE));
+    let compiled = compile(&text(REFERENCE));
     let record = record(&compiled, 10.0, rate);
     let theta: Vec<f64> = compiled.study.parameters.iter().map(|p| p.start).collect();
     let mut bound = Bound::new(&compiled.model, &record.inputs, &theta);
@@ -65,7 +67,14 @@ fn problem(name: &str, text: fn(f64) -> String, rate: f64, wanted: (f64, f64), p
     });
     println!("{name}: {n} states, {} parameters; instructions {:?}", theta.len(), compiled.model.instruction_counts());
     println!("  rates: {:.3} us per call, peer {} us: {:.2} times", call * 1e3, peers.call, call * 1e3 / peers.call);
-    let reference = simulate(&compiled, &record, &theta, Gradient::AllParameters).expect("a reference");
+    let reference = simulate(&compiled, &record, &theta, Gradient::None).expect("a reference");
+    let (seconds, gradient_reference) = timed(1, || {
+        simulate(&compile(&text(GRADIENT_REFERENCE)), &record, &theta, Gradient::AllParameters).expect("a reference")
+    });
+    println!(
+        "  references: {} steps; gradient {} steps, {seconds:.2} s",
+        reference.work.steps, gradient_reference.work.steps
+    );
     for method in ["automatic", "bdf"] {
         let nominal = first_good(
             text,
@@ -94,7 +103,7 @@ fn problem(name: &str, text: fn(f64) -> String, rate: f64, wanted: (f64, f64), p
             |compiled| {
                 let (time, run) =
                     timed(3, || simulate(compiled, &record, &theta, Gradient::AllParameters).expect("a run"));
-                (error_of_sensitivities(&run, &reference, &theta), time, run)
+                (error_of_sensitivities(&run, &gradient_reference, &theta), time, run)
             },
             wanted.1,
         );
@@ -127,6 +136,13 @@ fn first_good(
         let tolerance = 10f64.powf(-0.5 * f64::from(half_decade));
         let compiled = compile(&with_method(text, tolerance, method));
         let (error, time, trajectory) = run(&compiled);
+        if std::env::args().any(|argument| argument == "--all") {
+            let work = &trajectory.work;
+            println!(
+                "    {method} {tolerance:.0e}: error {error:.1e}, {time:.4} s, {} steps, {} rejected, {} evaluations, {}",
+                work.steps, work.rejected_error, work.residuals, work.method
+            );
+        }
         if error <= wanted {
             return Some((tolerance, error, time, trajectory));
         }

@@ -2,6 +2,7 @@
 
 use super::problem::{Dynamics, Work};
 use super::structure::Structure;
+use crate::linear::RowOrder;
 
 /// Parts of the run in which blame is counted.
 const PARTS: usize = 200;
@@ -22,6 +23,7 @@ pub(super) struct Augmented<'d, D: ?Sized> {
     pub jacobian: Vec<f64>,
     pub jacobian_rows: Vec<usize>,
     pub jacobian_columns: Vec<usize>,
+    order: RowOrder,
     mass: Vec<f64>,
     parameter: Vec<f64>,
     parameter_places: Vec<usize>,
@@ -32,6 +34,7 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
         let n = dynamics.dimension();
         let p = if with_sensitivities { dynamics.parameter_count() } else { 0 };
         let pattern = dynamics.pattern();
+        let order = RowOrder::new(pattern);
         let (jacobian_rows, jacobian_columns): (Vec<usize>, Vec<usize>) = pattern.entries().unzip();
         let parameter_places: Vec<usize> = match dynamics.parameter_pattern() {
             Some(pattern) if p > 0 => (0..p)
@@ -51,6 +54,7 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
             structure,
             last_time: f64::INFINITY,
             jacobian: vec![0.0; jacobian_rows.len()],
+            order,
             mass: vec![0.0; jacobian_rows.len()],
             jacobian_rows,
             jacobian_columns,
@@ -77,7 +81,7 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
         self.work.jacobians += 1;
         self.dynamics.linearised_rates(t, y, y_rates, &mut self.jacobian, &mut self.parameter);
         s_rates.fill(0.0);
-        subtract_product(&self.jacobian, &self.jacobian_rows, &self.jacobian_columns, s, s_rates, self.p);
+        self.order.subtract_product(&self.jacobian, s, s_rates, self.p);
         self.subtract_parameter_entries(s_rates);
     }
 
@@ -122,7 +126,7 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
                 *m = (j - *m) / c;
             }
             result.fill(0.0);
-            subtract_product(&self.mass, &self.jacobian_rows, &self.jacobian_columns, v, result, self.p);
+            self.order.subtract_product(&self.mass, v, result, self.p);
         }
         self.dynamics.parameter_entries(t, y, y_prime, &mut self.parameter);
         self.subtract_parameter_entries(result);
@@ -146,7 +150,7 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
     ) {
         self.linearise(t, y, y_prime, 0.0);
         self.parameter_right_hand_side(t, y, y_prime, result);
-        subtract_product(&self.jacobian, &self.jacobian_rows, &self.jacobian_columns, s, result, self.p);
+        self.order.subtract_product(&self.jacobian, s, result, self.p);
     }
 
     fn subtract_parameter_entries(&self, target: &mut [f64]) {
@@ -163,18 +167,5 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
         counts.resize(PARTS, 0);
         let part = PARTS as f64 * (t - begin) / (end - begin).max(f64::MIN_POSITIVE);
         counts[(part.max(0.0) as usize).min(PARTS - 1)] += 1;
-    }
-}
-
-/// `result -= A V` for sparse `A` and row-major `V` of `width` columns.
-fn subtract_product(values: &[f64], rows: &[usize], columns: &[usize], v: &[f64], result: &mut [f64], width: usize) {
-    for ((value, row), column) in values.iter().zip(rows).zip(columns) {
-        if *value == 0.0 {
-            continue;
-        }
-        let target = &mut result[row * width..][..width];
-        for (r, v) in target.iter_mut().zip(&v[column * width..][..width]) {
-            *r -= value * v;
-        }
     }
 }

@@ -158,6 +158,7 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
             self.recorder.note(step);
             if !self.heed_events(end)? {
                 self.take_step();
+                self.heed_kinks(end)?;
                 self.heed_monitor(end)?;
             }
         }
@@ -179,7 +180,13 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
                 self.change_method(method_of(step.order), end)?;
             }
             match self.method {
-                Method::Explicit => self.runge_kutta.follow(&mut self.system, step.end)?,
+                Method::Explicit => {
+                    let pair = if step.order == Pair::Eight.order() { Pair::Eight } else { Pair::Five };
+                    if pair != self.runge_kutta.pair {
+                        self.change_pair(pair, end)?;
+                    }
+                    self.runge_kutta.follow(&mut self.system, step.end)?;
+                }
                 Method::Bdf => self.bdf.follow(&mut self.system, step.end, step.order as usize)?,
             }
             self.recorder.note(*step);
@@ -301,6 +308,23 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
         }
     }
 
+    /// The method of order 8 pays only where the solution is smooth.
+    fn heed_kinks(&mut self, end: f64) -> Result<(), Refusal> {
+        if self.method == Method::Explicit && self.runge_kutta.meets_kinks() {
+            self.system.work.reason += ", order 5 because order 8 had too many steps rejected at kinks";
+            self.system.work.switches.push((self.time, Pair::Five.name()));
+            self.change_pair(Pair::Five, end)?;
+        }
+        Ok(())
+    }
+
+    fn change_pair(&mut self, pair: Pair, end: f64) -> Result<(), Refusal> {
+        self.keep_solution();
+        self.runge_kutta.pair = pair;
+        self.system.work.method = pair.name();
+        if self.time < end { self.start_method(end) } else { Ok(()) }
+    }
+
     fn heed_monitor(&mut self, end: f64) -> Result<(), Refusal> {
         let Some(monitor) = &mut self.monitor else { return Ok(()) };
         let stiffness = match self.method {
@@ -333,13 +357,9 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
     }
 }
 
-/// The explicit pair that a plan was made with, else the one for this tolerance.
+/// The explicit pair that suits the tolerance.
 fn explicit_pair(options: &Options) -> Pair {
-    let eight = match &options.follow_plan {
-        Some(plan) => plan.steps.iter().any(|step| step.order == Pair::Eight.order()),
-        None => options.relative_tolerance <= TIGHT,
-    };
-    if eight { Pair::Eight } else { Pair::Five }
+    if options.relative_tolerance <= TIGHT { Pair::Eight } else { Pair::Five }
 }
 
 /// Distance of differences in time.

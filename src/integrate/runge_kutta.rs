@@ -5,6 +5,7 @@ use super::norm::{ErrorNorm, Size};
 use super::problem::{Dynamics, FailureCause, PlannedStep};
 use super::stepper::{Limits, Refusal, first_not_finite};
 use super::{dormand_prince, tsitouras};
+use crate::linear::combine;
 
 /// Controller of step sizes with memory of the last error (Hairer-Norsett-Wanner-1993, IV.2 of Hairer-Wanner-1996).
 const SAFETY: f64 = 0.9;
@@ -21,6 +22,11 @@ const THIRD_ORDER_SHARE: f64 = 0.1;
 /// Its estimate is that of a method of lower order, which at equal tolerance lets the global error grow larger than the
 /// method of order 5 does; this factor makes up for it.
 const CAUTION: f64 = 10.0;
+
+/// Attempts among which rejections of the method of order 8 are counted, and how many of them show kinks: about a smooth
+/// solution it rejects a few.
+const WATCHED_ATTEMPTS: u32 = 200;
+const REJECTED_AT_KINKS: u32 = 60;
 
 /// Which pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,6 +62,21 @@ impl Pair {
         match self {
             Pair::Five => tsitouras::STAGES,
             Pair::Eight => dormand_prince::STAGES,
+        }
+    }
+
+    /// Weights of the earlier stages in the argument of a stage; for the last one those of the solution.
+    fn row(self, stage: usize) -> dormand_prince::Row {
+        match self {
+            Pair::Five => tsitouras::ROWS[stage - 1],
+            Pair::Eight => dormand_prince::ROWS[stage - 1],
+        }
+    }
+
+    fn node(self, stage: usize) -> f64 {
+        match self {
+            Pair::Five => tsitouras::NODES[stage],
+            Pair::Eight => dormand_prince::NODES[stage],
         }
     }
 
@@ -97,13 +118,15 @@ pub(super) struct RungeKutta {
     zero: Vec<f64>,
     /// The last step came close to the bound of stability.
     pub near_stability: bool,
+    /// Attempts and rejections since the last look at kinks.
+    attempts: u32,
+    rejections: u32,
     /// Cause and component of the last rejection.
     trouble: (FailureCause, Option<usize>),
 }
 
 impl RungeKutta {
     pub fn new(pair: Pair, length: usize, norm: ErrorNorm) -> Self {
-        let used = if pair == Pair::Five { tsitouras::STAGES } else { dormand_prince::ALL_STAGES };
         Self {
             pair,
             time: 0.0,
@@ -111,7 +134,7 @@ impl RungeKutta {
             next_step: 0.0,
             last_error: 1e-4,
             norm,
-            stages: std::array::from_fn(|stage| vec![0.0; if stage < used { length } else { 0 }]),
+            stages: std::array::from_fn(|_| vec![0.0; length]),
             has_dense_stages: false,
             before: vec![0.0; length],
             current: vec![0.0; length],
@@ -120,6 +143,8 @@ impl RungeKutta {
             error: vec![0.0; length],
             zero: vec![0.0; length],
             near_stability: false,
+            attempts: 0,
+            rejections: 0,
             trouble: (FailureCause::StepTooSmall, None),
         }
     }
@@ -165,7 +190,9 @@ impl RungeKutta {
         let size = self.norm.of_state(&self.current).norm;
         let slope = self.norm.of(first).norm;
         let guess = if size < 1e-5 || slope < 1e-5 { 1e-6 * span } else { (0.01 * size / slope).min(span) };
-        combine(&mut self.argument, &self.current, guess, [1.0], [&*first]);
+        for ((out, base), slope) in self.argument.iter_mut().zip(&self.current).zip(first.iter()) {
+            *out = base + guess * slope;
+        }
         system.rates(self.time + guess, &self.argument, second);
         for (a, b) in second.iter_mut().zip(first.iter()) {
             *a -= b;
@@ -190,6 +217,7 @@ impl RungeKutta {
             let (step, reaches_end) = limits.fit(self.next_step, self.time, end);
             limits.check(system, self.time, step, end, self.trouble)?;
             self.attempt(system, step);
+            self.attempts += 1;
             let error = self.measure(step);
             if error.norm <= 1.0 {
                 let growth = self.growth(error.norm, if rejected { 1.0 } else { LARGEST_FACTOR });
@@ -200,6 +228,7 @@ impl RungeKutta {
                 return Ok(PlannedStep { end: self.time, order: self.pair.order() });
             }
             rejected = true;
+            self.rejections += 1;
             system.work.rejected_error += 1;
             self.next_step = step * self.shrink(error, system);
         }
@@ -217,6 +246,15 @@ impl RungeKutta {
         Ok(())
     }
 
+    /// Whether so many of the last attempts were rejected that a method of lower order gets further; to be asked after a step.
+    pub fn meets_kinks(&mut self) -> bool {
+        if self.pair == Pair::Five || self.attempts < WATCHED_ATTEMPTS {
+            return false;
+        }
+        let (attempts, rejections) = (std::mem::take(&mut self.attempts), std::mem::take(&mut self.rejections));
+        rejections * WATCHED_ATTEMPTS >= attempts * REJECTED_AT_KINKS
+    }
+
     /// Index of the stage at the end of the step.
     fn last(&self) -> usize {
         self.pair.stages() - 1
@@ -231,37 +269,12 @@ impl RungeKutta {
 
     /// All stages of a step; the new solution is left in `candidate`.
     fn attempt<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) {
-        match self.pair {
-            Pair::Five => self.attempt_five(system, h),
-            Pair::Eight => self.attempt_eight(system, h),
-        }
-    }
-
-    fn attempt_five<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) {
-        let t = self.time;
-        let [k1, k2, k3, k4, k5, k6, k7, ..] = &mut self.stages;
-        let (base, argument) = (&self.current, &mut self.argument);
-        combine(argument, base, h, tsitouras::STAGE_2, [k1]);
-        system.rates(t + tsitouras::NODES[1] * h, argument, k2);
-        combine(argument, base, h, tsitouras::STAGE_3, [k1, k2]);
-        system.rates(t + tsitouras::NODES[2] * h, argument, k3);
-        combine(argument, base, h, tsitouras::STAGE_4, [k1, k2, k3]);
-        system.rates(t + tsitouras::NODES[3] * h, argument, k4);
-        combine(argument, base, h, tsitouras::STAGE_5, [k1, k2, k3, k4]);
-        system.rates(t + tsitouras::NODES[4] * h, argument, k5);
-        combine(argument, base, h, tsitouras::STAGE_6, [k1, k2, k3, k4, k5]);
-        system.rates(t + h, argument, k6);
-        combine(&mut self.candidate, base, h, tsitouras::WEIGHTS, [k1, k2, k3, k4, k5, k6]);
-        system.rates(t + h, &self.candidate, k7);
-    }
-
-    fn attempt_eight<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) {
         let last = self.last();
         for stage in 1..=last {
             let (known, new) = self.stages.split_at_mut(stage);
             let target = if stage == last { &mut self.candidate } else { &mut self.argument };
-            combine_row(target, &self.current, h, dormand_prince::ROWS[stage - 1], known);
-            system.rates(self.time + dormand_prince::NODES[stage] * h, target, &mut new[0]);
+            combine(target, &self.current, h, self.pair.row(stage), known);
+            system.rates(self.time + self.pair.node(stage) * h, target, &mut new[0]);
         }
     }
 
@@ -269,14 +282,13 @@ impl RungeKutta {
         self.norm.set_weights_between(&self.current, &self.candidate);
         match self.pair {
             Pair::Five => {
-                let [k1, k2, k3, k4, k5, k6, k7, ..] = &self.stages;
-                combine(&mut self.error, &self.zero, h, tsitouras::ERROR, [k1, k2, k3, k4, k5, k6, k7]);
+                combine(&mut self.error, &self.zero, h, tsitouras::ERROR_ROW, &self.stages);
                 self.norm.of(&self.error)
             }
             Pair::Eight => {
-                combine_row(&mut self.error, &self.zero, h, dormand_prince::ERROR_3, &self.stages);
+                combine(&mut self.error, &self.zero, h, dormand_prince::ERROR_3, &self.stages);
                 let third = THIRD_ORDER_SHARE * self.norm.of(&self.error).norm;
-                combine_row(&mut self.error, &self.zero, h, dormand_prince::ERROR_5, &self.stages);
+                combine(&mut self.error, &self.zero, h, dormand_prince::ERROR_5, &self.stages);
                 let fifth = self.norm.of(&self.error);
                 let both = fifth.norm.hypot(third);
                 let norm = if both > 0.0 && both.is_finite() { CAUTION * fifth.norm * fifth.norm / both } else { both };
@@ -337,7 +349,7 @@ impl RungeKutta {
         let h = self.last_step;
         for stage in dormand_prince::STAGES..dormand_prince::ALL_STAGES {
             let (known, new) = self.stages.split_at_mut(stage);
-            combine_row(&mut self.argument, &self.before, h, dormand_prince::ROWS[stage - 1], known);
+            combine(&mut self.argument, &self.before, h, dormand_prince::ROWS[stage - 1], known);
             system.rates(self.time - (1.0 - dormand_prince::NODES[stage]) * h, &self.argument, &mut new[0]);
         }
         self.has_dense_stages = true;
@@ -348,9 +360,9 @@ impl RungeKutta {
         let share = 1.0 - (self.time - t) / self.last_step;
         match self.pair {
             Pair::Five => {
-                let [k1, k2, k3, k4, k5, k6, k7, ..] = &self.stages;
                 let weights = tsitouras::interpolation(share);
-                combine(z, &self.before, self.last_step, weights, [k1, k2, k3, k4, k5, k6, k7]);
+                let terms: [(usize, f64); tsitouras::STAGES] = std::array::from_fn(|stage| (stage, weights[stage]));
+                combine(z, &self.before, self.last_step, &terms, &self.stages);
             }
             Pair::Eight => self.interpolate_eight(share, z),
         }
@@ -378,28 +390,4 @@ fn component_of<D: Dynamics + ?Sized>(place: usize, system: &Augmented<D>) -> us
 
 fn not_finite<D: Dynamics + ?Sized>(time: f64, place: usize, system: &Augmented<D>) -> Refusal {
     Refusal::new(time, FailureCause::NotFinite).blaming(Some(component_of(place, system)))
-}
-
-/// `out = base + h sum_s coefficients[s] stages[s]`
-#[inline]
-fn combine<const S: usize>(out: &mut [f64], base: &[f64], h: f64, coefficients: [f64; S], stages: [&Vec<f64>; S]) {
-    let length = out.len();
-    let base = &base[..length];
-    let stages = stages.map(|stage| &stage[..length]);
-    for i in 0..length {
-        let mut sum = 0.0;
-        for s in 0..S {
-            sum += coefficients[s] * stages[s][i];
-        }
-        out[i] = base[i] + h * sum;
-    }
-}
-
-/// As [`combine`], with coefficients and stages from a table.
-fn combine_row(out: &mut [f64], base: &[f64], h: f64, row: dormand_prince::Row, stages: &[Vec<f64>]) {
-    out.copy_from_slice(base);
-    for &(stage, coefficient) in row {
-        let factor = h * coefficient;
-        out.iter_mut().zip(&stages[stage]).for_each(|(o, k)| *o += factor * k);
-    }
 }

@@ -1,17 +1,19 @@
 //! Coefficients of the explicit Runge-Kutta pair of order 5 (4) of Tsitouras-2011, with its interpolant of order 4.
 
+use super::dormand_prince::Row;
+
 /// Stages, the last of which is the first of the next step.
 pub(super) const STAGES: usize = 7;
 
 /// Times of the stages as shares of the step.
 pub(super) const NODES: [f64; STAGES] = [0.0, 0.161, 0.327, 0.9, 0.980_025_540_904_509_7, 1.0, 1.0];
 
-pub(super) const STAGE_2: [f64; 1] = [0.161];
-pub(super) const STAGE_3: [f64; 2] = [-0.008_480_655_492_356_989, 0.335_480_655_492_357];
-pub(super) const STAGE_4: [f64; 3] = [2.897_153_057_105_493_5, -6.359_448_489_975_075, 4.362_295_432_869_581_5];
-pub(super) const STAGE_5: [f64; 4] =
+const STAGE_2: [f64; 1] = [0.161];
+const STAGE_3: [f64; 2] = [-0.008_480_655_492_356_989, 0.335_480_655_492_357];
+const STAGE_4: [f64; 3] = [2.897_153_057_105_493_5, -6.359_448_489_975_075, 4.362_295_432_869_581_5];
+const STAGE_5: [f64; 4] =
     [5.325_864_828_439_257, -11.748_883_564_062_828, 7.495_539_342_889_836_5, -0.092_495_066_361_755_25];
-pub(super) const STAGE_6: [f64; 5] = [
+const STAGE_6: [f64; 5] = [
     5.861_455_442_946_42,
     -12.920_969_317_847_11,
     8.159_367_898_576_159,
@@ -19,7 +21,7 @@ pub(super) const STAGE_6: [f64; 5] = [
     -0.028_269_050_394_068_38,
 ];
 /// The solution of order 5.
-pub(super) const WEIGHTS: [f64; 6] = [
+const WEIGHTS: [f64; 6] = [
     0.096_460_766_818_065_23,
     0.01,
     0.479_889_650_414_499_6,
@@ -28,7 +30,7 @@ pub(super) const WEIGHTS: [f64; 6] = [
     2.324_710_524_099_774,
 ];
 /// Difference to the solution of order 4.
-pub(super) const ERROR: [f64; STAGES] = [
+const ERROR: [f64; STAGES] = [
     -0.001_780_011_052_225_777,
     -0.000_816_434_459_656_746_9,
     0.007_880_878_010_261_995,
@@ -37,6 +39,21 @@ pub(super) const ERROR: [f64; STAGES] = [
     -0.458_082_105_929_186_97,
     1.0 / 66.0,
 ];
+
+const fn row<const N: usize>(weights: [f64; N]) -> [(usize, f64); N] {
+    let mut row = [(0, 0.0); N];
+    let mut stage = 0;
+    while stage < N {
+        row[stage] = (stage, weights[stage]);
+        stage += 1;
+    }
+    row
+}
+
+/// Weights of the earlier stages in the arguments of the stages from the second on; the last row is the solution.
+pub(super) const ROWS: [Row; STAGES - 1] =
+    [&row(STAGE_2), &row(STAGE_3), &row(STAGE_4), &row(STAGE_5), &row(STAGE_6), &row(WEIGHTS)];
+pub(super) const ERROR_ROW: Row = &row(ERROR);
 
 /// The method is stable for real eigenvalues down to `-STABILITY / h`.
 pub(super) const STABILITY: f64 = 3.5;

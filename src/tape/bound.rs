@@ -83,7 +83,8 @@ impl<'a> Bound<'a> {
             self.model.forcing.execute(&mut self.registers, self.inputs);
         }
         let variables = &mut self.registers[layout.variables..layout.variables + self.model.variables.len()];
-        let same_variables = variables.iter().zip(y).all(|(a, b)| a.to_bits() == b.to_bits());
+        // Without early exit: a few vector instructions.
+        let same_variables = variables.iter().zip(y).fold(0, |bits, (a, b)| bits | (a.to_bits() ^ b.to_bits())) == 0;
         if !(same_time && same_variables) {
             variables.copy_from_slice(y);
             self.model.rates.execute(&mut self.registers, self.inputs);
@@ -91,10 +92,18 @@ impl<'a> Bound<'a> {
         self.is_current = true;
     }
 
+    /// The outputs into their registers.
+    pub(super) fn update_outputs(&mut self, t: f64, y: &[f64]) {
+        let layout = self.model.layout;
+        self.registers[layout.time] = t;
+        self.registers[layout.variables..layout.variables + self.model.variables.len()].copy_from_slice(y);
+        self.is_current = false;
+        self.model.outputs.execute(&mut self.registers, self.inputs);
+    }
+
     /// The measured channels, length m.
     pub fn outputs(&mut self, t: f64, y: &[f64], out: &mut [f64]) {
-        self.update(t, y);
-        self.model.outputs.execute(&mut self.registers, self.inputs);
+        self.update_outputs(t, y);
         self.gather(&self.model.output_registers, out);
     }
 
@@ -125,8 +134,7 @@ impl<'a> Bound<'a> {
     }
 
     fn evaluate_output_derivatives(&mut self, t: f64, y: &[f64]) {
-        self.update(t, y);
-        self.model.outputs.execute(&mut self.registers, self.inputs);
+        self.update_outputs(t, y);
         self.model.output_by_state.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
         if self.model.output_by_parameter.sweep.is_some() {
             self.model.output_by_parameter.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
@@ -175,13 +183,11 @@ impl<'a> Bound<'a> {
         }
     }
 
-    /// As [`Bound::scatter`]; rows of states get the sign of F = y' - rates, constraints stay as they are.
-    fn scatter_residual(&self, elements: &[Element], out: &mut [f64]) {
-        for element in elements {
-            let value = self.registers[element.register as usize];
-            let is_state = (element.row as usize) < self.model.state_count;
-            out[element.slot as usize] = if is_state { -value } else { value };
-        }
+    /// An element with the sign of F = y' - rates in rows of states; constraints stay as they are.
+    #[inline]
+    fn residual_slope(&self, element: &Element) -> f64 {
+        let value = self.registers[element.register as usize];
+        if (element.row as usize) < self.model.state_count { -value } else { value }
     }
 }
 
@@ -222,7 +228,9 @@ impl Dynamics for Bound<'_> {
         self.update(t, y);
         self.model.jacobian.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
         values.fill(0.0);
-        self.scatter_residual(&self.model.jacobian.elements, values);
+        for element in &self.model.jacobian.elements {
+            values[element.slot as usize] = self.residual_slope(element);
+        }
         for &slot in &self.model.diagonal {
             values[slot as usize] += c;
         }
@@ -243,8 +251,23 @@ impl Dynamics for Bound<'_> {
     fn parameter_derivative(&mut self, t: f64, y: &[f64], _y_prime: &[f64], values: &mut [f64]) {
         self.update(t, y);
         self.model.parameter_derivative.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
+        let n = self.model.dimension();
         values.fill(0.0);
-        self.scatter_residual(&self.model.parameter_derivative.elements, values);
+        for element in &self.model.parameter_derivative.elements {
+            values[element.column as usize * n + element.row as usize] = self.residual_slope(element);
+        }
+    }
+
+    fn parameter_pattern(&self) -> Option<&SparsityPattern> {
+        Some(&self.model.parameter_pattern)
+    }
+
+    fn parameter_entries(&mut self, t: f64, y: &[f64], _y_prime: &[f64], values: &mut [f64]) {
+        self.update(t, y);
+        self.model.parameter_derivative.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
+        for element in &self.model.parameter_derivative.elements {
+            values[element.slot as usize] = self.residual_slope(element);
+        }
     }
 
     fn explicit_rates(&mut self, t: f64, y: &[f64], rates: &mut [f64]) -> bool {

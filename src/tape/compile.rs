@@ -3,13 +3,12 @@
 use super::events::{Change, Events, When};
 use super::expansion::Expansion;
 use super::model::{Derivative, DerivativeForm, Element, Layout, Model, StartProgram};
-use super::program::{Instruction, Program};
+use super::program::{Line, Program};
 use super::sweep::Sweep;
 use crate::expression::{Binary, Entry, Graph, Node, Operation, Symbol};
 use crate::linear::SparsityPattern;
 use crate::mechanics::{StartEquation, System, Variable};
 use crate::study::EventTrigger;
-use std::collections::BTreeMap;
 use std::collections::HashMap;
 
 impl Model {
@@ -54,11 +53,12 @@ impl Model {
         everything.extend(start_derivatives.iter().flat_map(|entries| nodes_of(entries)));
 
         let mut assembler = Assembler::new(&roots.graph, system, &unknowns, &everything);
-        let prologue = assembler.program(&everything, Dependence::Parameters);
+        let mut prologue = assembler.program(&everything, Dependence::Parameters);
         let after_prologue = assembler.registers.clone();
         let forcing = assembler.program(&roots.rates, Dependence::Time);
         let rates = assembler.program(&roots.rates, Dependence::State);
         let rate_registers = assembler.registers_of(&roots.rates);
+        prologue.extend(assembler.take_copies());
         let after_rates = assembler.registers.clone();
 
         let variable_columns: Vec<u32> = (0..n).map(|i| (assembler.layout.variables + i) as u32).collect();
@@ -84,14 +84,18 @@ impl Model {
             let program = assembler.program(&nodes_of(&parameter_derivative), Dependence::State);
             assembler.derivative(program, &parameter_derivative)
         };
+        let places: Vec<(usize, usize)> =
+            parameter_derivative.elements.iter().map(|entry| (entry.row as usize, entry.column as usize)).collect();
+        let parameter_pattern = SparsityPattern::from_entries(n, p, &places);
+        parameter_derivative.place(|row, column| slot_in(&parameter_pattern, row, column));
         let dense = |rows: usize| move |row: usize, column: usize| column * rows + row;
-        parameter_derivative.place(dense(n));
 
-        assembler.registers.clone_from(&after_rates);
+        assembler.registers.clone_from(&after_prologue);
         let outputs = assembler.program(&roots.outputs, Dependence::State);
         let output_registers = assembler.registers_of(&roots.outputs);
         let m = roots.outputs.len();
-        let output_programs = [&prologue, &forcing, &rates, &outputs];
+        prologue.extend(assembler.take_copies());
+        let output_programs = [&prologue, &outputs];
         let (mut output_by_state, mut output_by_parameter) = if by_sweep {
             let by_state = assembler.swept(&output_programs, &variable_columns, &output_registers);
             (by_state, assembler.swept(&output_programs, &parameter_columns, &output_registers))
@@ -127,6 +131,7 @@ impl Model {
             })
             .collect();
 
+        prologue.extend(assembler.take_copies());
         let constant_end = assembler.constants.len();
         let mut registers = assembler.constants;
         registers.resize(assembler.next, 0.0);
@@ -152,6 +157,7 @@ impl Model {
             expansion,
             diagonal,
             parameter_derivative,
+            parameter_pattern,
             outputs,
             output_registers,
             output_by_state,
@@ -193,6 +199,7 @@ impl Roots {
         groups.extend(system.starts.iter().map(given));
         let (mut graph, nodes) = system.graph.extract(&groups.concat());
         let nodes = multiply_by_reciprocals(&mut graph, &nodes, &system.parameters);
+        let nodes = balance_sums(&mut graph, &nodes);
         let mut rest = nodes.into_iter();
         let mut groups = groups.iter().map(|group| rest.by_ref().take(group.len()).collect::<Vec<_>>());
         let mut next = || groups.next().unwrap_or_default();
@@ -256,9 +263,69 @@ fn multiply_by_reciprocals(graph: &mut Graph, roots: &[Node], parameters: &[Symb
     roots.iter().map(|root| image[root.index()]).collect()
 }
 
+/// Sums of many terms as trees instead of chains: their additions no longer wait for each other. Changes results by rounding.
+fn balance_sums(graph: &mut Graph, roots: &[Node]) -> Vec<Node> {
+    let nodes = graph.reachable(roots);
+    let mut uses = vec![0_u32; graph.len()];
+    let is_sum = |operation| matches!(operation, Operation::Binary(Binary::Add | Binary::Subtract, ..));
+    let mut in_sum = vec![false; graph.len()];
+    for &node in &nodes {
+        let operation = graph.operation(node);
+        for child in operation.children() {
+            uses[child.index()] += 1;
+            in_sum[child.index()] |= is_sum(operation);
+        }
+    }
+    roots.iter().for_each(|root| uses[root.index()] += 1);
+    let belongs: Vec<bool> = uses.iter().zip(&in_sum).map(|(uses, in_sum)| *uses == 1 && *in_sum).collect();
+    let mut image = vec![graph.constant(0.0); graph.len()];
+    for node in nodes {
+        let operation = graph.operation(node);
+        if is_sum(operation) && belongs[node.index()] {
+            continue;
+        }
+        image[node.index()] = if is_sum(operation) {
+            let mut terms = [Vec::new(), Vec::new()];
+            let mut open = vec![(node, false)];
+            while let Some((node, negative)) = open.pop() {
+                match graph.operation(node) {
+                    Operation::Binary(sign @ (Binary::Add | Binary::Subtract), a, b) => {
+                        for (child, negative) in [(b, negative ^ (sign == Binary::Subtract)), (a, negative)] {
+                            let is_inner = belongs[child.index()] && is_sum(graph.operation(child));
+                            if is_inner {
+                                open.push((child, negative));
+                            } else {
+                                terms[usize::from(negative)].push(image[child.index()]);
+                            }
+                        }
+                    }
+                    _ => terms[usize::from(negative)].push(image[node.index()]),
+                }
+            }
+            let [positive, negative] = terms.map(|terms| balanced_sum(graph, terms));
+            match (positive, negative) {
+                (Some(positive), Some(negative)) => graph.subtract(positive, negative),
+                (Some(sum), None) => sum,
+                (None, Some(negative)) => graph.negate(negative),
+                (None, None) => graph.constant(0.0),
+            }
+        } else {
+            graph.rebuild(operation, |child| image[child.index()])
+        };
+    }
+    roots.iter().map(|root| image[root.index()]).collect()
+}
+
+fn balanced_sum(graph: &mut Graph, mut terms: Vec<Node>) -> Option<Node> {
+    while terms.len() > 1 {
+        terms = terms.chunks(2).map(|pair| if let [a, b] = *pair { graph.add(a, b) } else { pair[0] }).collect();
+    }
+    terms.pop()
+}
+
 /// What a node's value depends on at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Dependence {
+pub(super) enum Dependence {
     Parameters,
     Time,
     State,
@@ -271,12 +338,14 @@ const SYMBOLIC_LIMIT: usize = 400_000;
 const UNASSIGNED: u32 = u32::MAX;
 
 /// Assigns registers to nodes while programs are written.
-struct Assembler<'a> {
-    graph: &'a Graph,
-    dependence: Vec<Dependence>,
+pub(super) struct Assembler<'a> {
+    pub(super) graph: &'a Graph,
+    pub(super) dependence: Vec<Dependence>,
     /// Register per node of the graph, `UNASSIGNED` where not computed yet.
-    registers: Vec<u32>,
-    next: usize,
+    pub(super) registers: Vec<u32>,
+    pub(super) next: usize,
+    /// Copies of what only parameters determine.
+    pub(super) copies: Vec<Vec<Line>>,
     layout: Layout,
     /// Initial content of the first registers.
     constants: Vec<f64>,
@@ -296,6 +365,7 @@ impl<'a> Assembler<'a> {
             dependence: vec![Dependence::Parameters; graph.len()],
             registers: vec![UNASSIGNED; graph.len()],
             next: 0,
+            copies: Vec::new(),
             layout,
             constants: vec![0.0; layout.variables + unknowns.len()],
         };
@@ -340,68 +410,7 @@ impl<'a> Assembler<'a> {
             .into_iter()
             .filter(|node| self.registers[node.index()] == UNASSIGNED && self.dependence[node.index()] <= limit)
             .collect();
-        let mut program = Program::default();
-        for node in self.schedule(&missing) {
-            let operation = self.graph.operation(node);
-            let operands: Vec<u32> = operation.children().map(|child| self.registers[child.index()]).collect();
-            let Some(instruction) = instruction(operation) else { continue };
-            program.push(instruction, self.next, &operands);
-            self.registers[node.index()] = self.next as u32;
-            self.next += 1;
-        }
-        program
-    }
-
-    /// Orders nodes so that equal instructions follow each other: always the instruction with most nodes ready.
-    fn schedule(&self, nodes: &[Node]) -> Vec<Node> {
-        let mut position = vec![usize::MAX; nodes.last().map_or(0, |node| node.index() + 1)];
-        nodes.iter().enumerate().for_each(|(i, node)| position[node.index()] = i);
-        let mut waiting = vec![0_usize; nodes.len()];
-        // Readers of each node as linked lists in one vector of (reader, next).
-        let mut first_reader = vec![usize::MAX; nodes.len()];
-        let mut readers: Vec<(usize, usize)> = Vec::with_capacity(2 * nodes.len());
-        let mut ready: BTreeMap<Instruction, Vec<usize>> = BTreeMap::new();
-        for (i, &node) in nodes.iter().enumerate() {
-            let operation = self.graph.operation(node);
-            for child in operation.children() {
-                let child = position[child.index()];
-                if child != usize::MAX {
-                    waiting[i] += 1;
-                    readers.push((i, first_reader[child]));
-                    first_reader[child] = readers.len() - 1;
-                }
-            }
-            if waiting[i] == 0
-                && let Some(instruction) = instruction(operation)
-            {
-                ready.entry(instruction).or_default().push(i);
-            }
-        }
-        let mut order = Vec::with_capacity(nodes.len());
-        while let Some(instruction_now) = most_ready(&ready) {
-            let mut queue = ready.remove(&instruction_now).unwrap_or_default();
-            let mut head = 0;
-            while head < queue.len() {
-                let i = queue[head];
-                head += 1;
-                order.push(nodes[i]);
-                let mut edge = first_reader[i];
-                while edge != usize::MAX {
-                    let (reader, next_edge) = readers[edge];
-                    edge = next_edge;
-                    waiting[reader] -= 1;
-                    if waiting[reader] > 0 {
-                        continue;
-                    }
-                    match instruction(self.graph.operation(nodes[reader])) {
-                        Some(next) if next == instruction_now => queue.push(reader),
-                        Some(next) => ready.entry(next).or_default().push(reader),
-                        None => {}
-                    }
-                }
-            }
-        }
-        order
+        Program::new(self.schedule(&missing, limit > Dependence::Parameters))
     }
 
     fn derivative(&self, program: Program, entries: &[Entry]) -> Derivative {
@@ -450,21 +459,6 @@ impl<'a> Assembler<'a> {
         let mut derivative = self.derivative(Program::default(), &in_states);
         derivative.place(|row, column| column * state_count + row);
         StartProgram { program, values: registers, elements: derivative.elements }
-    }
-}
-
-fn most_ready(ready: &BTreeMap<Instruction, Vec<usize>>) -> Option<Instruction> {
-    // The last of equals wins in `max_by_key`; reversed, ties go to the first instruction.
-    ready.iter().rev().max_by_key(|(_, nodes)| nodes.len()).map(|(&instruction, _)| instruction)
-}
-
-fn instruction(operation: Operation) -> Option<Instruction> {
-    match operation {
-        Operation::Constant(_) | Operation::Symbol(_) => None,
-        Operation::Unary(function, _) => Some(Instruction::Unary(function)),
-        Operation::Binary(function, _, _) => Some(Instruction::Binary(function)),
-        Operation::Select { .. } => Some(Instruction::Select),
-        Operation::Sample { input, order, .. } => Some(Instruction::Sample { input, order }),
     }
 }
 

@@ -53,14 +53,11 @@ impl RegisterNames<'_> {
 }
 
 fn section(text: &mut String, title: &str, program: &Program, registers: &RegisterNames) {
-    let _ = writeln!(text, "\n{title}: {} instructions in {} runs", program.instruction_count(), program.runs().len());
-    for run in program.runs() {
-        let operands = program.operands(run).chunks_exact(run.instruction.operand_count());
-        for (offset, operands) in operands.enumerate() {
-            let operands: Vec<String> = operands.iter().map(|&operand| registers.name(operand)).collect();
-            let target = run.first_target + offset;
-            let _ = writeln!(text, "  r{target} = {}", instruction_text(run.instruction, &operands));
-        }
+    let (count, runs) = (program.lines().len(), program.run_count());
+    let _ = writeln!(text, "\n{title}: {count} instructions in {runs} runs");
+    for line in program.lines() {
+        let operands: Vec<String> = line.operands().iter().map(|&operand| registers.name(operand)).collect();
+        let _ = writeln!(text, "  r{} = {}", line.target, instruction_text(line.instruction, &operands));
     }
 }
 
@@ -74,6 +71,7 @@ fn instruction_text(instruction: Instruction, operands: &[String]) -> String {
         Instruction::Unary(Unary::Negate) => return format!("-{}", operands[0]),
         Instruction::Unary(function) => return format!("{}({})", function.name(), operands[0]),
         Instruction::Binary(function) => return format!("{}({})", function.name(), operands.join(", ")),
+        Instruction::Copy => return operands[0].clone(),
         Instruction::Select => return format!("if {} then {} else {}", operands[0], operands[1], operands[2]),
         Instruction::Sample { input, order } => {
             return format!("input {input}{}({})", "'".repeat(order.into()), operands[0]);

@@ -9,11 +9,14 @@
 
 mod bound;
 mod compile;
+mod elementary;
 mod emit;
 mod events;
 mod expansion;
+mod kernels;
 mod model;
 mod program;
+mod schedule;
 mod slopes;
 mod sweep;
 mod tangent;

@@ -40,8 +40,10 @@ pub struct Model {
     pub(super) expansion: Option<Expansion>,
     /// Slots of the diagonal of differential variables in the pattern.
     pub(super) diagonal: Vec<u32>,
+    /// Slots are those of `parameter_pattern`.
     pub(super) parameter_derivative: Derivative,
-    /// Runs after `rates`.
+    pub(super) parameter_pattern: SparsityPattern,
+    /// Runs by itself after the prologue: most measures need little of the rates.
     pub(super) outputs: Program,
     pub(super) output_registers: Vec<u32>,
     /// Runs after `outputs`: d(outputs)/d(variables) and d(outputs)/d(parameters), which share the program of the
@@ -98,7 +100,7 @@ impl Derivative {
     }
 
     fn work(&self) -> usize {
-        self.sweep.as_ref().map_or(self.program.instruction_count(), Sweep::work)
+        self.sweep.as_ref().map_or(self.program.lines().len(), Sweep::work)
     }
 }
 
@@ -228,11 +230,6 @@ impl Model {
 
     /// Instructions per evaluation of rates, Jacobian, parameter derivatives, outputs.
     pub fn instruction_counts(&self) -> [usize; 4] {
-        [
-            self.rates.instruction_count(),
-            self.jacobian.work(),
-            self.parameter_derivative.work(),
-            self.outputs.instruction_count(),
-        ]
+        [self.rates.lines().len(), self.jacobian.work(), self.parameter_derivative.work(), self.outputs.lines().len()]
     }
 }

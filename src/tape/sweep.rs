@@ -6,7 +6,7 @@
 
 use super::InputSource;
 use super::model::Element;
-use super::program::{Instruction, Program};
+use super::program::{Instruction, Line, Program};
 use super::slopes::{slope, slopes};
 use crate::expression::{Binary, Unary};
 
@@ -18,16 +18,8 @@ type Tangent = [f64; WIDTH];
 /// A matrix of derivatives of registers with respect to registers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweep {
-    instructions: Vec<Linear>,
+    instructions: Vec<Line>,
     groups: Vec<Group>,
-}
-
-/// An instruction with at most two operands that carry derivatives.
-#[derive(Clone, Copy, Debug)]
-struct Linear {
-    instruction: Instruction,
-    target: u32,
-    operands: [u32; 3],
 }
 
 #[derive(Clone, Debug)]
@@ -104,7 +96,7 @@ impl Sweep {
         rows: &[u32],
         next: &mut usize,
     ) -> (Self, Vec<Element>) {
-        let instructions: Vec<Linear> = programs.iter().flat_map(|program| linear(program)).collect();
+        let instructions: Vec<Line> = programs.iter().flat_map(|program| program.lines()).copied().collect();
         let mut reach = Reach::new(register_count, columns);
         for instruction in &instructions {
             for &operand in carrying(instruction) {
@@ -166,7 +158,7 @@ impl Sweep {
         scratch: &'s mut Scratch,
     ) -> &'s [[f64; 2]] {
         scratch.partials.clear();
-        scratch.partials.extend(self.instructions.iter().map(|linear| partials(linear, registers, inputs)));
+        scratch.partials.extend(self.instructions.iter().map(|line| partials(line, registers, inputs)));
         &scratch.partials
     }
 
@@ -201,41 +193,28 @@ impl Sweep {
     }
 }
 
-fn linear(program: &Program) -> Vec<Linear> {
-    let mut list = Vec::with_capacity(program.instruction_count());
-    for run in program.runs() {
-        let operands = program.operands(run).chunks_exact(run.instruction.operand_count());
-        for (offset, operands) in operands.enumerate() {
-            let mut three = [0; 3];
-            three[..operands.len()].copy_from_slice(operands);
-            let target = (run.first_target + offset) as u32;
-            list.push(Linear { instruction: run.instruction, target, operands: three });
-        }
-    }
-    list
-}
-
 /// Operands whose change changes the result.
-fn carrying(linear: &Linear) -> &[u32] {
-    match linear.instruction {
+fn carrying(line: &Line) -> &[u32] {
+    match line.instruction {
         Instruction::Unary(Unary::Sign | Unary::Floor) | Instruction::Binary(Binary::Less) => &[],
-        Instruction::Unary(_) | Instruction::Sample { .. } => &linear.operands[..1],
-        Instruction::Binary(_) => &linear.operands[..2],
-        Instruction::Select => &linear.operands[1..3],
+        Instruction::Unary(_) | Instruction::Copy | Instruction::Sample { .. } => &line.operands[..1],
+        Instruction::Binary(_) => &line.operands[..2],
+        Instruction::Select => &line.operands[1..3],
     }
 }
 
-fn tangent_operands(linear: &Linear) -> [Option<u32>; 2] {
-    let carrying = carrying(linear);
+fn tangent_operands(line: &Line) -> [Option<u32>; 2] {
+    let carrying = carrying(line);
     [carrying.first().copied(), carrying.get(1).copied()]
 }
 
 /// Derivatives by the carrying operands, at the values in the registers.
-fn partials(linear: &Linear, registers: &[f64], inputs: &dyn InputSource) -> [f64; 2] {
-    let value = |operand: usize| registers[linear.operands[operand] as usize];
-    match linear.instruction {
-        Instruction::Unary(function) => [slope(function, value(0), registers[linear.target as usize]), 0.0],
-        Instruction::Binary(function) => slopes(function, [value(0), value(1)], registers[linear.target as usize]),
+fn partials(line: &Line, registers: &[f64], inputs: &dyn InputSource) -> [f64; 2] {
+    let value = |operand: usize| registers[line.operands[operand] as usize];
+    match line.instruction {
+        Instruction::Unary(function) => [slope(function, value(0), registers[line.target as usize]), 0.0],
+        Instruction::Binary(function) => slopes(function, [value(0), value(1)], registers[line.target as usize]),
+        Instruction::Copy => [1.0, 0.0],
         Instruction::Select if value(0) != 0.0 => [1.0, 0.0],
         Instruction::Select => [0.0, 1.0],
         Instruction::Sample { input, order } => [inputs.sample(input, order + 1, value(0)), 0.0],

@@ -9,24 +9,22 @@ use super::{Bound, InputSource};
 impl Program {
     /// Slopes of all results from the slopes of what they read; `values` hold the program's results already.
     fn tangent(&self, values: &[f64], slopes: &mut [f64], inputs: &dyn InputSource) {
-        for run in self.runs() {
-            let count = run.instruction.operand_count();
-            for (k, operands) in self.operands(run).chunks_exact(count).enumerate() {
-                let value = |i: usize| values[operands[i] as usize];
-                let slope = |i: usize| slopes[operands[i] as usize];
-                let target = run.first_target + k;
-                slopes[target] = match run.instruction {
-                    Instruction::Unary(function) => slope_of(function, value(0), values[target]) * slope(0),
-                    Instruction::Binary(function) => {
-                        carried(slopes_of(function, [value(0), value(1)], values[target]), [slope(0), slope(1)])
-                    }
-                    Instruction::Select => slope(if value(0) != 0.0 { 1 } else { 2 }),
-                    Instruction::Sample { input, order } if slope(0) != 0.0 => {
-                        inputs.sample(input, order + 1, value(0)) * slope(0)
-                    }
-                    Instruction::Sample { .. } => 0.0,
-                };
-            }
+        for line in self.lines() {
+            let value = |i: usize| values[line.operands[i] as usize];
+            let slope = |i: usize| slopes[line.operands[i] as usize];
+            let target = line.target as usize;
+            slopes[target] = match line.instruction {
+                Instruction::Unary(function) => slope_of(function, value(0), values[target]) * slope(0),
+                Instruction::Binary(function) => {
+                    carried(slopes_of(function, [value(0), value(1)], values[target]), [slope(0), slope(1)])
+                }
+                Instruction::Copy => slope(0),
+                Instruction::Select => slope(if value(0) != 0.0 { 1 } else { 2 }),
+                Instruction::Sample { input, order } if slope(0) != 0.0 => {
+                    inputs.sample(input, order + 1, value(0)) * slope(0)
+                }
+                Instruction::Sample { .. } => 0.0,
+            };
         }
     }
 }
@@ -83,10 +81,9 @@ impl Bound<'_> {
         (y, y_slopes): (&[f64], &[f64]),
         slopes: &mut [f64],
     ) {
-        let n = self.model.dimension();
-        let (mut values, mut rates) = (vec![0.0; n], vec![0.0; n]);
-        self.rates_tangent(tangent, t, (y, y_slopes), (&mut values, &mut rates));
-        self.model.outputs.execute(&mut self.registers, self.inputs);
+        self.update_outputs(t, y);
+        let first = self.model.layout.variables;
+        tangent.slopes[first..first + y_slopes.len()].copy_from_slice(y_slopes);
         self.model.outputs.tangent(&self.registers, &mut tangent.slopes, self.inputs);
         for (slope, &register) in slopes.iter_mut().zip(&self.model.output_registers) {
             *slope = tangent.slopes[register as usize];

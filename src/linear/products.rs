@@ -1,0 +1,181 @@
+//! Products and sums over long rows, compiled once per width of vector registers.
+
+use super::SparsityPattern;
+use multiversion::multiversion;
+
+/// The order in which a sparse matrix is multiplied row by row, for values in the order of its pattern.
+#[derive(Clone, Debug, Default)]
+pub struct RowOrder {
+    /// Entries of row i are `entries[starts[i]..starts[i + 1]]`.
+    starts: Vec<usize>,
+    /// Index among the values, column.
+    entries: Vec<(u32, u32)>,
+}
+
+impl RowOrder {
+    pub fn new(pattern: &SparsityPattern) -> Self {
+        let mut rows = vec![Vec::new(); pattern.row_count];
+        for (index, (row, column)) in pattern.entries().enumerate() {
+            rows[row].push((index as u32, column as u32));
+        }
+        let mut order = Self { starts: vec![0], entries: Vec::with_capacity(pattern.len()) };
+        for row in rows {
+            order.entries.extend(row);
+            order.starts.push(order.entries.len());
+        }
+        order
+    }
+
+    /// `result -= A V` for row-major `V` and `result` of `width` columns; values in the order of the pattern.
+    pub fn subtract_product(&self, values: &[f64], v: &[f64], result: &mut [f64], width: usize) {
+        subtract_product(&self.starts, &self.entries, values, v, result, width);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn subtract_product(
+    starts: &[usize],
+    entries: &[(u32, u32)],
+    values: &[f64],
+    v: &[f64],
+    result: &mut [f64],
+    width: usize,
+) {
+    if width == 0 {
+        return;
+    }
+    for (range, target) in starts.windows(2).zip(result.chunks_exact_mut(width)) {
+        let row = &entries[range[0]..range[1]];
+        let mut first = 0;
+        while first + 16 <= width {
+            subtract_block::<16>(row, values, v, width, first, target);
+            first += 16;
+        }
+        if first + 8 <= width {
+            subtract_block::<8>(row, values, v, width, first, target);
+            first += 8;
+        }
+        if first + 4 <= width {
+            subtract_block::<4>(row, values, v, width, first, target);
+            first += 4;
+        }
+        while first < width {
+            subtract_block::<1>(row, values, v, width, first, target);
+            first += 1;
+        }
+    }
+}
+
+/// The part of a row of the product from column `first` on, accumulated in registers.
+#[inline(always)]
+fn subtract_block<const W: usize>(
+    row: &[(u32, u32)],
+    values: &[f64],
+    v: &[f64],
+    width: usize,
+    first: usize,
+    target: &mut [f64],
+) {
+    let target = &mut target[first..first + W];
+    let mut sum: [f64; W] = std::array::from_fn(|k| target[k]);
+    for &(index, column) in row {
+        let value = values[index as usize];
+        let of_column = &v[column as usize * width + first..][..W];
+        for k in 0..W {
+            sum[k] -= value * of_column[k];
+        }
+    }
+    target.copy_from_slice(&sum);
+}
+
+/// `out = base + factor sum_s coefficient_s vectors[index_s]` for the listed (index, coefficient).
+///
+/// # Panics
+///
+/// If a vector is shorter than `out`.
+pub fn combine(out: &mut [f64], base: &[f64], factor: f64, terms: &[(usize, f64)], vectors: &[Vec<f64>]) {
+    combine_all(out, base, factor, terms, vectors);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn combine_all(out: &mut [f64], base: &[f64], factor: f64, terms: &[(usize, f64)], vectors: &[Vec<f64>]) {
+    const WIDTH: usize = 16;
+    let length = out.len();
+    let mut first = 0;
+    while first + WIDTH <= length {
+        combine_block::<WIDTH>(out, base, factor, terms, vectors, first);
+        first += WIDTH;
+    }
+    if first + 4 <= length {
+        combine_block::<4>(out, base, factor, terms, vectors, first);
+        first += 4;
+    }
+    if first + 4 <= length {
+        combine_block::<4>(out, base, factor, terms, vectors, first);
+        first += 4;
+    }
+    while first < length {
+        combine_block::<1>(out, base, factor, terms, vectors, first);
+        first += 1;
+    }
+}
+
+#[inline(always)]
+fn combine_block<const W: usize>(
+    out: &mut [f64],
+    base: &[f64],
+    factor: f64,
+    terms: &[(usize, f64)],
+    vectors: &[Vec<f64>],
+    first: usize,
+) {
+    let mut sum = [0.0; W];
+    for &(index, coefficient) in terms {
+        let vector = &vectors[index][first..first + W];
+        for k in 0..W {
+            sum[k] += coefficient * vector[k];
+        }
+    }
+    let (out, base) = (&mut out[first..first + W], &base[first..first + W]);
+    for k in 0..W {
+        out[k] = base[k] + factor * sum[k];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_those_of_single_elements() {
+        let entries = [(0, 1), (2, 0), (1, 2), (0, 2), (2, 2)];
+        let pattern = SparsityPattern::from_entries(3, 3, &entries);
+        let values: Vec<f64> = (0..pattern.len()).map(|k| 0.5 + k as f64).collect();
+        for width in [0, 1, 3, 4, 7, 8, 16, 29, 34] {
+            let v: Vec<f64> = (0..3 * width).map(|k| (k as f64).sin()).collect();
+            let start: Vec<f64> = (0..3 * width).map(|k| (k as f64).cos()).collect();
+            let mut expected = start.clone();
+            for (value, (row, column)) in values.iter().zip(pattern.entries()) {
+                (0..width).for_each(|j| expected[row * width + j] -= value * v[column * width + j]);
+            }
+            let mut result = start;
+            RowOrder::new(&pattern).subtract_product(&values, &v, &mut result, width);
+            assert!(result.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-14), "width {width}");
+        }
+    }
+
+    #[test]
+    fn combinations_are_those_of_single_elements() {
+        for length in [0, 1, 3, 6, 8, 11, 16, 35] {
+            let vectors: Vec<Vec<f64>> =
+                (0..3).map(|s| (0..length).map(|k| ((s + 3 * k) as f64).sin()).collect()).collect();
+            let base: Vec<f64> = (0..length).map(|k| k as f64).collect();
+            let mut out = vec![f64::NAN; length];
+            combine(&mut out, &base, 0.5, &[(2, 3.0), (0, -1.0)], &vectors);
+            for k in 0..length {
+                let expected = base[k] + 0.5 * (3.0 * vectors[2][k] - vectors[0][k]);
+                assert!((out[k] - expected).abs() < 1e-14);
+            }
+        }
+    }
+}
