@@ -47,7 +47,11 @@ fn subtract_product(
     for (range, target) in starts.windows(2).zip(result.chunks_exact_mut(width)) {
         let row = &entries[range[0]..range[1]];
         let mut first = 0;
-        while first + 16 <= width {
+        while first + 32 <= width {
+            subtract_block::<32>(row, values, v, width, first, target);
+            first += 32;
+        }
+        if first + 16 <= width {
             subtract_block::<16>(row, values, v, width, first, target);
             first += 16;
         }
@@ -59,9 +63,12 @@ fn subtract_product(
             subtract_block::<4>(row, values, v, width, first, target);
             first += 4;
         }
-        while first < width {
+        if first + 2 <= width {
+            subtract_block::<2>(row, values, v, width, first, target);
+            first += 2;
+        }
+        if first < width {
             subtract_block::<1>(row, values, v, width, first, target);
-            first += 1;
         }
     }
 }
@@ -151,7 +158,7 @@ mod tests {
         let entries = [(0, 1), (2, 0), (1, 2), (0, 2), (2, 2)];
         let pattern = SparsityPattern::from_entries(3, 3, &entries);
         let values: Vec<f64> = (0..pattern.len()).map(|k| 0.5 + k as f64).collect();
-        for width in [0, 1, 3, 4, 7, 8, 16, 29, 34] {
+        for width in [0, 1, 3, 4, 7, 8, 16, 31, 34, 63] {
             let v: Vec<f64> = (0..3 * width).map(|k| (k as f64).sin()).collect();
             let start: Vec<f64> = (0..3 * width).map(|k| (k as f64).cos()).collect();
             let mut expected = start.clone();

@@ -182,13 +182,6 @@ impl<'a> Bound<'a> {
             out[element.slot as usize] = sign * self.registers[element.register as usize];
         }
     }
-
-    /// An element with the sign of F = y' - rates in rows of states; constraints stay as they are.
-    #[inline]
-    fn residual_slope(&self, element: &Element) -> f64 {
-        let value = self.registers[element.register as usize];
-        if (element.row as usize) < self.model.state_count { -value } else { value }
-    }
 }
 
 impl Dynamics for Bound<'_> {
@@ -227,10 +220,7 @@ impl Dynamics for Bound<'_> {
     fn jacobian(&mut self, t: f64, y: &[f64], _y_prime: &[f64], c: f64, values: &mut [f64]) {
         self.update(t, y);
         self.model.jacobian.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
-        values.fill(0.0);
-        for element in &self.model.jacobian.elements {
-            values[element.slot as usize] = self.residual_slope(element);
-        }
+        self.model.jacobian_sources.gather(&self.registers, values);
         for &slot in &self.model.diagonal {
             values[slot as usize] += c;
         }
@@ -254,7 +244,9 @@ impl Dynamics for Bound<'_> {
         let n = self.model.dimension();
         values.fill(0.0);
         for element in &self.model.parameter_derivative.elements {
-            values[element.column as usize * n + element.row as usize] = self.residual_slope(element);
+            let value = self.registers[element.register as usize];
+            let is_state = (element.row as usize) < self.model.state_count;
+            values[element.column as usize * n + element.row as usize] = if is_state { -value } else { value };
         }
     }
 
@@ -265,9 +257,7 @@ impl Dynamics for Bound<'_> {
     fn parameter_entries(&mut self, t: f64, y: &[f64], _y_prime: &[f64], values: &mut [f64]) {
         self.update(t, y);
         self.model.parameter_derivative.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
-        for element in &self.model.parameter_derivative.elements {
-            values[element.slot as usize] = self.residual_slope(element);
-        }
+        self.model.parameter_sources.gather(&self.registers, values);
     }
 
     fn explicit_rates(&mut self, t: f64, y: &[f64], rates: &mut [f64]) -> bool {

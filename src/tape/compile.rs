@@ -2,7 +2,7 @@
 
 use super::events::{Change, Events, When};
 use super::expansion::Expansion;
-use super::model::{Derivative, DerivativeForm, Element, Layout, Model, StartProgram};
+use super::model::{Derivative, DerivativeForm, Element, Layout, Model, Sources, StartProgram};
 use super::program::{Line, Program};
 use super::sweep::Sweep;
 use crate::expression::{Binary, Entry, Graph, Node, Operation, Symbol};
@@ -72,6 +72,7 @@ impl Model {
         };
         let (pattern, diagonal) = iteration_pattern(n, state_count, &jacobian.elements);
         jacobian.place(|row, column| slot_in(&pattern, row, column));
+        let jacobian_sources = Sources::new(&jacobian.elements, pattern.len(), state_count);
         let places = (&variable_columns[..], &rate_registers[..]);
         let sizes = (state_count, jacobian.elements.len());
         let expanded = |sweep| Expansion::new(sweep, assembler.next, places, sizes);
@@ -88,6 +89,7 @@ impl Model {
             parameter_derivative.elements.iter().map(|entry| (entry.row as usize, entry.column as usize)).collect();
         let parameter_pattern = SparsityPattern::from_entries(n, p, &places);
         parameter_derivative.place(|row, column| slot_in(&parameter_pattern, row, column));
+        let parameter_sources = Sources::new(&parameter_derivative.elements, parameter_pattern.len(), state_count);
         let dense = |rows: usize| move |row: usize, column: usize| column * rows + row;
 
         assembler.registers.clone_from(&after_prologue);
@@ -153,11 +155,13 @@ impl Model {
             rates,
             rate_registers,
             jacobian,
+            jacobian_sources,
             pattern,
             expansion,
             diagonal,
             parameter_derivative,
             parameter_pattern,
+            parameter_sources,
             outputs,
             output_registers,
             output_by_state,

@@ -35,6 +35,8 @@ pub struct Model {
     /// Registers of rates, then constraints. Length n.
     pub(super) rate_registers: Vec<u32>,
     pub(super) jacobian: Derivative,
+    /// Per slot of `pattern`: where its value stands.
+    pub(super) jacobian_sources: Sources,
     pub(super) pattern: SparsityPattern,
     /// The Jacobian with intermediate results as further unknowns, where derivatives are swept.
     pub(super) expansion: Option<Expansion>,
@@ -43,6 +45,7 @@ pub struct Model {
     /// Slots are those of `parameter_pattern`.
     pub(super) parameter_derivative: Derivative,
     pub(super) parameter_pattern: SparsityPattern,
+    pub(super) parameter_sources: Sources,
     /// Runs by itself after the prologue: most measures need little of the rates.
     pub(super) outputs: Program,
     pub(super) output_registers: Vec<u32>,
@@ -111,6 +114,31 @@ pub(super) struct Element {
     pub register: u32,
     /// Index into the values of the matrix this element is written to.
     pub slot: u32,
+}
+
+/// Where the values of a matrix of derivatives of the residual stand, in the order of its slots.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sources {
+    registers: Vec<u32>,
+    /// -1 in rows of states, as F = y' - rates; 1 in those of constraints; 0 where there is no element.
+    signs: Vec<f64>,
+}
+
+impl Sources {
+    pub fn new(elements: &[Element], slots: usize, state_count: usize) -> Self {
+        let mut sources = Self { registers: vec![0; slots], signs: vec![0.0; slots] };
+        for element in elements {
+            sources.registers[element.slot as usize] = element.register;
+            sources.signs[element.slot as usize] = if (element.row as usize) < state_count { -1.0 } else { 1.0 };
+        }
+        sources
+    }
+
+    pub fn gather(&self, registers: &[f64], values: &mut [f64]) {
+        for ((value, &register), &sign) in values.iter_mut().zip(&self.registers).zip(&self.signs) {
+            *value = if sign == 0.0 { 0.0 } else { sign * registers[register as usize] };
+        }
+    }
 }
 
 /// Start values of one experiment.
