@@ -45,8 +45,10 @@ pub struct Stretches<'a> {
 
 /// Why a model cannot be taken stretch by stretch: its states are not free.
 pub fn stretches_refused(compiled: &Compiled) -> Option<&'static str> {
-    let bound_states = compiled.model.state_count() < compiled.model.dimension();
-    bound_states.then_some("the mechanism has loops: its states cannot be moved one by one")
+    if compiled.model.state_count() < compiled.model.dimension() {
+        return Some("the mechanism has loops: its states cannot be moved one by one");
+    }
+    (compiled.model.switch_count() > 0).then_some("laws switch: which mode they are in is no state that could be moved")
 }
 
 impl<'a> Stretches<'a> {
