@@ -3,6 +3,23 @@
 use super::SparsityPattern;
 use multiversion::multiversion;
 
+/// Calls a function over a range of columns in blocks of constant width, the widest that fit.
+macro_rules! in_blocks {
+    ($length:expr, $widest:literal, $($narrower:literal),+; $block:ident $arguments:tt) => {{
+        let mut first = 0;
+        while first + $widest <= $length {
+            $block::<$widest>(first, $arguments);
+            first += $widest;
+        }
+        let mut rest = $length - first;
+        $(if rest >= $narrower {
+            $block::<$narrower>($length - rest, $arguments);
+            rest -= $narrower;
+        })+
+        debug_assert_eq!(rest, 0);
+    }};
+}
+
 /// The order in which a sparse matrix is multiplied row by row, for values in the order of its pattern.
 #[derive(Clone, Debug, Default)]
 pub struct RowOrder {
@@ -46,42 +63,15 @@ fn subtract_product(
     }
     for (range, target) in starts.windows(2).zip(result.chunks_exact_mut(width)) {
         let row = &entries[range[0]..range[1]];
-        let mut first = 0;
-        while first + 32 <= width {
-            subtract_block::<32>(row, values, v, width, first, target);
-            first += 32;
-        }
-        if first + 16 <= width {
-            subtract_block::<16>(row, values, v, width, first, target);
-            first += 16;
-        }
-        if first + 8 <= width {
-            subtract_block::<8>(row, values, v, width, first, target);
-            first += 8;
-        }
-        if first + 4 <= width {
-            subtract_block::<4>(row, values, v, width, first, target);
-            first += 4;
-        }
-        if first + 2 <= width {
-            subtract_block::<2>(row, values, v, width, first, target);
-            first += 2;
-        }
-        if first < width {
-            subtract_block::<1>(row, values, v, width, first, target);
-        }
+        in_blocks!(width, 32, 16, 8, 4, 2, 1; subtract_block (row, values, v, width, &mut *target));
     }
 }
 
 /// The part of a row of the product from column `first` on, accumulated in registers.
 #[inline(always)]
 fn subtract_block<const W: usize>(
-    row: &[(u32, u32)],
-    values: &[f64],
-    v: &[f64],
-    width: usize,
     first: usize,
-    target: &mut [f64],
+    (row, values, v, width, target): (&[(u32, u32)], &[f64], &[f64], usize, &mut [f64]),
 ) {
     let target = &mut target[first..first + W];
     let mut sum: [f64; W] = std::array::from_fn(|k| target[k]);
@@ -106,35 +96,13 @@ pub fn combine(out: &mut [f64], base: &[f64], factor: f64, terms: &[(usize, f64)
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn combine_all(out: &mut [f64], base: &[f64], factor: f64, terms: &[(usize, f64)], vectors: &[Vec<f64>]) {
-    const WIDTH: usize = 16;
-    let length = out.len();
-    let mut first = 0;
-    while first + WIDTH <= length {
-        combine_block::<WIDTH>(out, base, factor, terms, vectors, first);
-        first += WIDTH;
-    }
-    if first + 4 <= length {
-        combine_block::<4>(out, base, factor, terms, vectors, first);
-        first += 4;
-    }
-    if first + 4 <= length {
-        combine_block::<4>(out, base, factor, terms, vectors, first);
-        first += 4;
-    }
-    while first < length {
-        combine_block::<1>(out, base, factor, terms, vectors, first);
-        first += 1;
-    }
+    in_blocks!(out.len(), 16, 8, 4, 2, 1; combine_block (&mut *out, base, factor, terms, vectors));
 }
 
 #[inline(always)]
 fn combine_block<const W: usize>(
-    out: &mut [f64],
-    base: &[f64],
-    factor: f64,
-    terms: &[(usize, f64)],
-    vectors: &[Vec<f64>],
     first: usize,
+    (out, base, factor, terms, vectors): (&mut [f64], &[f64], f64, &[(usize, f64)], &[Vec<f64>]),
 ) {
     let mut sum = [0.0; W];
     for &(index, coefficient) in terms {
