@@ -10,6 +10,14 @@ use crate::study::{
 };
 use std::fmt::Write;
 
+/// Number of the form of the texts (docs/emitted_text.md): grows when a line that was there is written otherwise.
+pub const TEXT_FORM: u32 = 1;
+
+/// First line of every text: what it is of, and in which form.
+pub(crate) fn head(kind: &str, study: &Study) -> String {
+    format!("{kind} {} ({}), form {TEXT_FORM}\n", study.name, study.variant)
+}
+
 /// The spanning tree: ground, joints with their coordinates, bodies.
 ///
 /// # Errors
@@ -18,7 +26,7 @@ use std::fmt::Write;
 pub fn emit_tree(study: &Study) -> Result<String, Vec<Diagnostic>> {
     let mut graph = study.graph.clone();
     let tree = spanning_tree(study, &mut graph)?;
-    let mut text = format!("tree {} ({})\nground\n", study.name, study.variant);
+    let mut text = head("tree", study) + "ground\n";
     branches(&mut text, study, &tree, None, 1);
     let moving = tree.links.iter().filter(|link| link.free_symbols().is_some()).count();
     for joint in study.joints.iter().filter(|joint| joint.closes_loop) {
@@ -109,7 +117,7 @@ pub(super) fn axis_text(axis: [f64; 3]) -> String {
 pub fn emit_model(study: &Study, system: &System) -> String {
     let inputs = input_names(study);
     let printer = Printer::plain(&study.graph, &inputs);
-    let mut text = format!("model {} ({})\n", study.name, study.variant);
+    let mut text = head("model", study);
     let _ = writeln!(text, "gravity = {}", vector_text(&printer, &study.gravity));
     for parameter in &study.parameters {
         let _ = writeln!(
@@ -292,7 +300,7 @@ pub fn emit_equations(study: &Study, system: &System) -> String {
     let mut roots: Vec<Node> = system.rates.iter().chain(&system.constraints).copied().collect();
     roots.extend(system.outputs.iter().map(|output| output.value));
     let printer = Printer::sharing(&system.graph, &inputs, &roots);
-    let mut text = format!("equations {} ({})\n", study.name, study.variant);
+    let mut text = head("equations", study);
     let definitions = printer.definitions();
     if !definitions.is_empty() {
         text.push_str("\nwhere\n");

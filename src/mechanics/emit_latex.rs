@@ -28,7 +28,7 @@ pub fn emit_latex(study: &Study, system: &System) -> String {
         lines.push(format!("{} &= {}", latex_name(&output.name), printer.text(output.value)));
     }
     lines.extend(printer.definitions().into_iter().map(|(name, formula)| format!("{name} &= {formula}")));
-    let mut text = format!("% {} ({})\n\\begin{{align*}}\n", study.name, study.variant);
+    let mut text = format!("% {}\\begin{{align*}}\n", super::emit::head("latex", study));
     let _ = writeln!(text, "  {}", lines.join(" \\\\\n  "));
     text + "\\end{align*}\n"
 }

@@ -32,6 +32,6 @@ mod system;
 mod topology;
 
 pub use derive::derive;
-pub use emit::{emit_equations, emit_model, emit_tree};
+pub use emit::{TEXT_FORM, emit_equations, emit_model, emit_tree};
 pub use emit_latex::emit_latex;
 pub use system::*;
