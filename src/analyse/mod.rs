@@ -8,6 +8,7 @@ mod characteristic;
 mod courses;
 mod criterion;
 mod cuts;
+mod descents;
 mod increments;
 mod monte_carlo;
 mod plan;
@@ -17,6 +18,7 @@ pub use characteristic::{Characteristic, Course as LawCourse, Demonstration, Tra
 pub use courses::{Course, Courses, courses};
 pub use criterion::{CriterionValues, evaluate};
 pub use cuts::{Cut, CutCurve, Cuts, cuts};
+pub use descents::{Descent, Descents, descents};
 pub use monte_carlo::MonteCarlo;
 pub use plan::*;
 pub use validity::*;

@@ -11,6 +11,7 @@ mod diagnose;
 mod explain;
 mod fit;
 mod format;
+mod gradients;
 mod law;
 mod new;
 mod optimisers;
@@ -54,6 +55,8 @@ enum Command {
     Cuts(cuts::Arguments),
     /// Compare optimisers: cost over the number of simulations
     Optimisers(optimisers::Arguments),
+    /// Compare gradients: cost over the iterations, internal differentiation against finite differences
+    Gradients(gradients::Arguments),
     /// Judge what the identified model is good for: criteria with confidence
     Validate(validate::Arguments),
     /// Bring study files into canonical layout
@@ -114,6 +117,7 @@ pub fn run() -> ExitCode {
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Cuts(arguments) => cuts::run(&arguments),
         Command::Optimisers(arguments) => optimisers::run(&arguments),
+        Command::Gradients(arguments) => gradients::run(&arguments),
         Command::Validate(arguments) => validate::run(&arguments),
         Command::Fmt(arguments) => format::run(&arguments),
         Command::New(arguments) => new::run(&arguments),

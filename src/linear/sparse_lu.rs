@@ -14,6 +14,8 @@ const PREFER_DIAGONAL: f64 = 0.1;
 const REUSE_PIVOT: f64 = 1e-3;
 /// A column whose largest remaining scaled entry is below this counts as dependent.
 const SINGULAR: f64 = 1e-15;
+/// From the position on from which the factors are this full they are stored without gaps.
+const DENSE_SHARE: f64 = 0.6;
 const NONE: usize = usize::MAX;
 
 /// `P R A Q = L U` with row scaling R, row exchanges P and column order Q.
@@ -251,87 +253,150 @@ impl SparseLu {
     /// Which parts of the factors a solution needs: what right-hand sides reach, and what wanted elements depend on.
     fn plan_passes(&mut self) {
         let n = self.columns.len();
+        let tail = self.dense_tail();
         let mut is_reached: Vec<bool> = self.pivot_row.iter().map(|&row| row < self.wanted).collect();
         self.forward.clear();
         for k in 0..n {
             if is_reached[k] {
                 self.lower.column(k).for_each(|l| is_reached[self.lower.positions[l]] = true);
-                self.forward.add(k, self.lower.column(k).map(|l| (self.lower.positions[l], l)));
+                let dense = if k >= tail { k + 1..n } else { 0..0 };
+                self.forward.add(k, self.lower.column(k).map(|l| (self.lower.positions[l], l)), dense);
             }
         }
         let mut is_needed: Vec<bool> = self.columns.iter().map(|&column| column < self.wanted).collect();
         for k in 0..n {
-            is_needed[k] |= self.upper.column(k).any(|u| is_needed[self.upper.rows[u]]);
+            is_needed[k] |= k >= tail || self.upper.column(k).any(|u| is_needed[self.upper.rows[u]]);
         }
         self.backward.clear();
         for k in (0..n).rev().filter(|&k| is_needed[k]) {
             let entries = self.upper.column(k).map(|u| (self.upper.rows[u], u));
-            self.backward.add(k, entries.filter(|(row, _)| is_needed[*row]));
+            let dense = if k >= tail { tail..k } else { 0..0 };
+            self.backward.add(k, entries.filter(|(row, _)| is_needed[*row]), dense);
         }
+    }
+
+    /// First position from which on both factors together are mostly full.
+    fn dense_tail(&self) -> usize {
+        let n = self.columns.len();
+        let mut begins = vec![0_usize; n + 1];
+        for k in 0..n {
+            // Entries of a lower column lie behind it, those of an upper one before: each counts where its block begins.
+            begins[k] += self.lower.column(k).len();
+            self.upper.column(k).for_each(|u| begins[self.upper.rows[u]] += 1);
+        }
+        let (mut entries, mut tail) = (0, n);
+        for k in (0..n).rev() {
+            entries += begins[k];
+            let size = n - k;
+            if entries as f64 >= DENSE_SHARE * (size * (size - 1)) as f64 {
+                tail = k;
+            }
+        }
+        tail
     }
 }
 
 /// The entries of a triangular factor in the order in which a solution reads them.
 #[derive(Clone, Debug, Default)]
 struct Pass {
-    /// Positions whose value is subtracted, and where their entries begin.
-    sources: Vec<(u32, u32)>,
+    sources: Vec<Source>,
     targets: Vec<u32>,
-    /// Index of each entry in its triangle.
+    /// Index of each scattered entry in its triangle.
     from: Vec<u32>,
     values: Vec<f64>,
+    /// The same for entries of dense ranges, `ABSENT` for zeros.
+    dense_from: Vec<u32>,
+    dense_values: Vec<f64>,
 }
+
+/// A position whose value is subtracted from others: scattered ones, and a range without gaps.
+#[derive(Clone, Copy, Debug)]
+struct Source {
+    position: u32,
+    /// End of its scattered entries.
+    end: u32,
+    dense_begin: u32,
+    dense_length: u32,
+}
+
+const ABSENT: u32 = u32::MAX;
 
 impl Pass {
     fn clear(&mut self) {
         *self = Self::default();
     }
 
-    fn add(&mut self, source: usize, entries: impl Iterator<Item = (usize, usize)>) {
-        self.sources.push((source as u32, self.targets.len() as u32));
+    fn add(&mut self, position: usize, entries: impl Iterator<Item = (usize, usize)>, dense: std::ops::Range<usize>) {
+        let first = self.dense_from.len();
+        self.dense_from.resize(first + dense.len(), ABSENT);
         for (target, from) in entries {
-            self.targets.push(target as u32);
-            self.from.push(from as u32);
+            if dense.contains(&target) {
+                self.dense_from[first + target - dense.start] = from as u32;
+            } else {
+                self.targets.push(target as u32);
+                self.from.push(from as u32);
+            }
         }
+        self.sources.push(Source {
+            position: position as u32,
+            end: self.targets.len() as u32,
+            dense_begin: dense.start as u32,
+            dense_length: dense.len() as u32,
+        });
     }
 
     fn take_values(&mut self, triangle: &Triangle) {
         self.values.clear();
         self.values.extend(self.from.iter().map(|&from| triangle.values[from as usize]));
-    }
-
-    /// Ends of the entries of each source.
-    fn ends(&self) -> impl Iterator<Item = usize> {
-        let next = self.sources.iter().skip(1).map(|(_, start)| *start as usize);
-        next.chain(std::iter::once(self.targets.len()))
+        let value = |&from: &u32| if from == ABSENT { 0.0 } else { triangle.values[from as usize] };
+        self.dense_values.clear();
+        self.dense_values.extend(self.dense_from.iter().map(value));
     }
 
     fn run_one(&self, x: &mut [f64], inverse_pivot: Option<&[f64]>) {
-        for (&(source, start), end) in self.sources.iter().zip(self.ends()) {
-            let mut value = x[source as usize];
+        let (mut start, mut dense) = (0, 0);
+        for source in &self.sources {
+            let (position, end) = (source.position as usize, source.end as usize);
+            let (length, begin) = (source.dense_length as usize, source.dense_begin as usize);
+            let entries = self.targets[start..end].iter().zip(&self.values[start..end]);
+            let factors = &self.dense_values[dense..dense + length];
+            start = end;
+            dense += length;
+            let mut value = x[position];
             if value == 0.0 {
                 continue;
             }
             if let Some(inverse) = inverse_pivot {
-                value *= inverse[source as usize];
-                x[source as usize] = value;
+                value *= inverse[position];
+                x[position] = value;
             }
-            let entries = self.targets[start as usize..end].iter().zip(&self.values[start as usize..end]);
             for (&target, factor) in entries {
                 x[target as usize] -= factor * value;
+            }
+            for (target, factor) in x[begin..begin + length].iter_mut().zip(factors) {
+                *target -= factor * value;
             }
         }
     }
 
     fn run(&self, x: &mut [f64], width: usize, inverse_pivot: Option<&[f64]>) {
-        for (&(source, start), end) in self.sources.iter().zip(self.ends()) {
-            let source = source as usize;
+        let (mut start, mut dense) = (0, 0);
+        for source in &self.sources {
+            let (position, end) = (source.position as usize, source.end as usize);
             if let Some(inverse) = inverse_pivot {
-                x[source * width..(source + 1) * width].iter_mut().for_each(|value| *value *= inverse[source]);
+                x[position * width..(position + 1) * width].iter_mut().for_each(|value| *value *= inverse[position]);
             }
-            for (target, factor) in self.targets[start as usize..end].iter().zip(&self.values[start as usize..end]) {
-                subtract_row(x, *target as usize, source, width, *factor);
+            for (target, factor) in self.targets[start..end].iter().zip(&self.values[start..end]) {
+                subtract_row(x, *target as usize, position, width, *factor);
             }
+            for k in 0..source.dense_length as usize {
+                let factor = self.dense_values[dense + k];
+                if factor != 0.0 {
+                    subtract_row(x, source.dense_begin as usize + k, position, width, factor);
+                }
+            }
+            start = end;
+            dense += source.dense_length as usize;
         }
     }
 }

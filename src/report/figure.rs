@@ -31,7 +31,7 @@ path{fill:none}.paper{fill:#fff}.grid{stroke:#e9ecef}.zero{stroke:#c5ccd3}.frame
 .dot.missing{fill:#7a8794}.dot.after{fill:#0072b2}.ring{fill:#fff;stroke:#1b1f24;stroke-width:1.3}";
 
 pub use super::characteristic::characteristic;
-pub use super::surface::{courses, cuts};
+pub use super::surface::{courses, cuts, descents};
 
 /// A picture of its own with a title.
 pub(super) fn framed(width: f64, height: f64, title: &str, content: &str) -> String {

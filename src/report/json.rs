@@ -3,7 +3,7 @@
 //! The schema's text lies in `docs/schema/`; it is generated from the types and their documentation, and a test keeps
 //! both equal.
 
-use crate::analyse::{Courses, Cuts, Plan, Validity};
+use crate::analyse::{Courses, Cuts, Descents, Plan, Validity};
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 use schemars::{JsonSchema, Schema, generate::SchemaSettings, transform::Transform};
@@ -19,6 +19,7 @@ pub const VALIDITY: &str = "ident.validity/1";
 pub const PLAN: &str = "ident.plan/1";
 pub const OPTIMISERS: &str = "ident.optimisers/1";
 pub const CUTS: &str = "ident.cuts/1";
+pub const GRADIENTS: &str = "ident.gradients/1";
 
 /// Result of `ident diagnose`.
 pub fn answer(answer: &Answer) -> Result<String, serde_json::Error> {
@@ -55,6 +56,11 @@ pub fn cuts(cuts: &Cuts) -> Result<String, serde_json::Error> {
     envelope(CUTS, cuts)
 }
 
+/// Result of `ident gradients`.
+pub fn descents(descents: &Descents) -> Result<String, serde_json::Error> {
+    envelope(GRADIENTS, descents)
+}
+
 /// The JSON Schemas by name of output, ready to be written to `docs/schema/`.
 pub fn schemas() -> Vec<(&'static str, Value)> {
     vec![
@@ -65,6 +71,7 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
         (PLAN, schema::<Plan>(PLAN)),
         (OPTIMISERS, schema::<Courses>(OPTIMISERS)),
         (CUTS, schema::<Cuts>(CUTS)),
+        (GRADIENTS, schema::<Descents>(GRADIENTS)),
     ]
 }
 

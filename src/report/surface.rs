@@ -1,6 +1,6 @@
 //! Pictures of the cost: over the work of optimisers, and along parameters.
 
-use crate::analyse::{Courses, CutCurve, Cuts};
+use crate::analyse::{Courses, CutCurve, Cuts, Descents};
 use crate::report::chart::{Axis, Mark, Plot, Style, escape};
 use crate::report::figure::framed;
 
@@ -39,6 +39,36 @@ pub fn courses(courses: &Courses) -> String {
         y_axis: None,
     };
     let title = format!("Optimisers on {}, {} parameters", courses.study, courses.parameters.len());
+    framed(WIDTH, COURSES_HEIGHT, &title, &format!("<g transform=\"translate(0 {TOP})\">{}</g>", plot.group()))
+}
+
+/// Cost (logarithm, relative to the start's) over the iterations, by gradient and tolerance.
+pub fn descents(descents: &Descents) -> String {
+    let names: Vec<String> =
+        descents.descents.iter().map(|own| format!("{}, tolerance {:.0e}", own.gradient, own.tolerance)).collect();
+    let marks = descents
+        .descents
+        .iter()
+        .zip(&names)
+        .enumerate()
+        .map(|(index, (own, name))| {
+            let first = own.costs.first().copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
+            let x: Vec<f64> = (0..own.costs.len()).map(|iteration| iteration as f64).collect();
+            let y: Vec<f64> = own.costs.iter().map(|cost| (cost / first).log10()).collect();
+            Mark::Line { x: x.into(), y: y.into(), style: Style::Variant(index), name }
+        })
+        .collect();
+    let plot = Plot {
+        width: WIDTH,
+        height: COURSES_HEIGHT - TOP,
+        x_label: "iterations".to_owned(),
+        y_label: "cost, powers of ten below the start".to_owned(),
+        marks,
+        legend: true,
+        x_axis: None,
+        y_axis: None,
+    };
+    let title = format!("Gradients on {}, {} parameters", escape(&descents.study), descents.parameters.len());
     framed(WIDTH, COURSES_HEIGHT, &title, &format!("<g transform=\"translate(0 {TOP})\">{}</g>", plot.group()))
 }
 

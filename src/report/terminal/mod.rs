@@ -11,7 +11,7 @@ mod surface;
 mod table;
 mod validity;
 
-use crate::analyse::{Courses, Cuts, Plan, Validity};
+use crate::analyse::{Courses, Cuts, Descents, Plan, Validity};
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 
@@ -70,6 +70,11 @@ pub fn plan(result: &Plan) -> String {
 /// What tests would tell.
 pub fn plan_in(result: &Plan, colour: Colour) -> String {
     plan::text(result, colour)
+}
+
+/// Gradients side by side, without colours.
+pub fn descents(result: &Descents) -> String {
+    surface::descents(result, Colour::Never)
 }
 
 /// Optimisers side by side, without colours.

@@ -3,7 +3,7 @@
 use super::Colour;
 use super::sheet::Sheet;
 use super::table::{Lean, Table};
-use crate::analyse::{Courses, Cuts};
+use crate::analyse::{Courses, Cuts, Descents};
 use crate::report::number;
 
 pub fn courses(courses: &Courses, colour: Colour) -> String {
@@ -32,6 +32,33 @@ pub fn courses(courses: &Courses, colour: Colour) -> String {
         sheet.paragraph(&format!("Held at their estimates: {}.", courses.held.join(", ")), 2);
     }
     sheet.paragraph("A gradient by internal differentiation counts as one simulation per parameter more.", 2);
+    sheet.finish()
+}
+
+pub fn descents(descents: &Descents, colour: Colour) -> String {
+    let mut sheet = Sheet::new(colour);
+    let count = descents.parameters.len();
+    sheet.heading(&format!("Gradients on {} (variant {}), {count} parameters", descents.study, descents.variant));
+    let mut table = Table::new(&[
+        ("gradient", Lean::Left),
+        ("tolerance", Lean::Right),
+        ("cost", Lean::Right),
+        ("iterations", Lean::Right),
+        ("simulations", Lean::Right),
+        ("ended", Lean::Left),
+    ]);
+    for descent in &descents.descents {
+        table.row(vec![
+            descent.gradient.clone(),
+            format!("{:.0e}", descent.tolerance),
+            descent.costs.last().map_or("-".into(), |cost| number::significant(*cost, 5)),
+            descent.costs.len().saturating_sub(1).to_string(),
+            descent.simulations.to_string(),
+            descent.reason.clone(),
+        ]);
+    }
+    sheet.table(&table, 2);
+    sheet.paragraph("An internal derivative by one parameter counts as one simulation, though it costs less.", 2);
     sheet.finish()
 }
 
