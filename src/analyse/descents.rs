@@ -8,6 +8,9 @@ use crate::simulation::{Compiled, Record};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+/// Iterations after which a search that still creeps is ended.
+const ITERATIONS: usize = 20;
+
 /// Searches with both gradients at several tolerances of the integrator, from the study's start, all under the same weights.
 #[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct Descents {
@@ -67,8 +70,9 @@ fn descent(compiled: &Compiled, records: &[&Record], fitted: &Fitted, internal: 
     let scales = parameters.iter().map(|parameter| parameter.scale()).collect();
     let mut watched =
         Watched { problem, differences: (!internal).then_some(tolerance), scales, upper: column(|p| p.upper) };
+    let options = Options { maximum_iterations: ITERATIONS, ..Options::default() };
     let mut costs = Vec::new();
-    let outcome = levenberg_marquardt(&mut watched, &start, &bounds, &Options::default(), &mut |progress| {
+    let outcome = levenberg_marquardt(&mut watched, &start, &bounds, &options, &mut |progress| {
         costs.push(progress.cost);
         Control::Continue
     });

@@ -1,6 +1,6 @@
 //! Pictures of the cost: over the work of optimisers, and along parameters.
 
-use crate::analyse::{Courses, CutCurve, Cuts, Descents};
+use crate::analyse::{Courses, CutCurve, Cuts, Descent, Descents};
 use crate::report::chart::{Axis, Mark, Plot, Style, escape};
 use crate::report::figure::framed;
 
@@ -42,19 +42,24 @@ pub fn courses(courses: &Courses) -> String {
     framed(WIDTH, COURSES_HEIGHT, &title, &format!("<g transform=\"translate(0 {TOP})\">{}</g>", plot.group()))
 }
 
-/// Cost (logarithm, relative to the start's) over the iterations, by gradient and tolerance.
+/// Excess costs below this share of the lowest cost are drawn as this.
+const SMALLEST_EXCESS: f64 = 1e-6;
+
+/// Excess over the lowest cost (logarithm) over the iterations, by gradient and tolerance.
 pub fn descents(descents: &Descents) -> String {
+    let short = |own: &Descent| own.gradient.replace("internal differentiation", "internal").replace("finite ", "");
     let names: Vec<String> =
-        descents.descents.iter().map(|own| format!("{}, tolerance {:.0e}", own.gradient, own.tolerance)).collect();
+        descents.descents.iter().map(|own| format!("{}, {:.0e}", short(own), own.tolerance)).collect();
+    let lowest = descents.descents.iter().flat_map(|own| &own.costs).copied().fold(f64::INFINITY, f64::min);
+    let lowest = lowest.max(f64::MIN_POSITIVE);
     let marks = descents
         .descents
         .iter()
         .zip(&names)
         .enumerate()
         .map(|(index, (own, name))| {
-            let first = own.costs.first().copied().unwrap_or(1.0).max(f64::MIN_POSITIVE);
             let x: Vec<f64> = (0..own.costs.len()).map(|iteration| iteration as f64).collect();
-            let y: Vec<f64> = own.costs.iter().map(|cost| (cost / first).log10()).collect();
+            let y: Vec<f64> = own.costs.iter().map(|cost| (cost / lowest - 1.0).max(SMALLEST_EXCESS).log10()).collect();
             Mark::Line { x: x.into(), y: y.into(), style: Style::Variant(index), name }
         })
         .collect();
@@ -62,7 +67,7 @@ pub fn descents(descents: &Descents) -> String {
         width: WIDTH,
         height: COURSES_HEIGHT - TOP,
         x_label: "iterations".to_owned(),
-        y_label: "cost, powers of ten below the start".to_owned(),
+        y_label: "excess over the lowest cost, powers of ten".to_owned(),
         marks,
         legend: true,
         x_axis: None,
