@@ -67,12 +67,12 @@ fn subtract_product(
     }
 }
 
+/// Entries of a row of the matrix, its values, the other factor with the length of its rows, the row of the result.
+type RowProduct<'a> = (&'a [(u32, u32)], &'a [f64], &'a [f64], usize, &'a mut [f64]);
+
 /// The part of a row of the product from column `first` on, accumulated in registers.
 #[inline(always)]
-fn subtract_block<const W: usize>(
-    first: usize,
-    (row, values, v, width, target): (&[(u32, u32)], &[f64], &[f64], usize, &mut [f64]),
-) {
+fn subtract_block<const W: usize>(first: usize, (row, values, v, width, target): RowProduct) {
     let target = &mut target[first..first + W];
     let mut sum: [f64; W] = std::array::from_fn(|k| target[k]);
     for &(index, column) in row {
@@ -99,11 +99,11 @@ fn combine_all(out: &mut [f64], base: &[f64], factor: f64, terms: &[(usize, f64)
     in_blocks!(out.len(), 16, 8, 4, 2, 1; combine_block (&mut *out, base, factor, terms, vectors));
 }
 
+/// The arguments of [`combine`].
+type Combination<'a> = (&'a mut [f64], &'a [f64], f64, &'a [(usize, f64)], &'a [Vec<f64>]);
+
 #[inline(always)]
-fn combine_block<const W: usize>(
-    first: usize,
-    (out, base, factor, terms, vectors): (&mut [f64], &[f64], f64, &[(usize, f64)], &[Vec<f64>]),
-) {
+fn combine_block<const W: usize>(first: usize, (out, base, factor, terms, vectors): Combination) {
     let mut sum = [0.0; W];
     for &(index, coefficient) in terms {
         let vector = &vectors[index][first..first + W];
