@@ -16,6 +16,8 @@ mod models;
 mod prelude;
 #[path = "study/tables.rs"]
 mod tables;
+#[path = "study/track.rs"]
+mod track;
 
 use ident::diagnostics::{Code, render};
 use ident::study::{check, load_text};

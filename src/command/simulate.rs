@@ -106,7 +106,10 @@ fn table(compiled: &Compiled, record: &Record, trajectory: &Trajectory) -> Resul
     for (k, time) in record.compared_times().iter().enumerate() {
         let mut row = vec![time.to_string()];
         row.extend(
-            measures.clone().zip(&trajectory.channels).map(|(m, channel)| m.unit.from_si(channel[k]).to_string()),
+            measures
+                .clone()
+                .zip(&trajectory.channels)
+                .map(|(m, channel)| m.unit.from_si(m.shown(channel[k])).to_string()),
         );
         writer.write_record(&row).map_err(|error| error.to_string())?;
     }

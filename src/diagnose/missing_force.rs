@@ -223,6 +223,8 @@ fn explained(source: &Source, record: &Record, place: &Place) -> Option<Vec<f64>
         value: sum,
         noise: None,
         weight: 1.0,
+        delay: None,
+        quantisation: None,
         span: Default::default(),
     }];
     let compiled = Compiled::new(study).ok()?;

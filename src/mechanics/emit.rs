@@ -180,6 +180,16 @@ pub fn emit_model(study: &Study, system: &System) -> String {
     }
     for measure in &study.measures {
         let _ = writeln!(text, "measure {} [{}] = {}", measure.name, measure.unit.symbol, printer.text(measure.value));
+        if let Some(delay) = measure.delay {
+            let _ = writeln!(text, "  delayed by {}", printer.text(delay));
+        }
+        if let Some(step) = measure.quantisation {
+            let _ = writeln!(
+                text,
+                "  rounded to multiples of {step}; in fits noise of standard deviation {}",
+                step / 12f64.sqrt()
+            );
+        }
     }
     for (owner, start, _) in study.starts() {
         let base = match start.base {

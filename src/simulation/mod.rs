@@ -5,6 +5,7 @@
 //! about parameters.
 
 mod certificate;
+mod delay;
 mod failure;
 mod inputs;
 mod manoeuvre;

@@ -1,5 +1,6 @@
 //! One record simulated.
 
+use super::delay::{Delays, Schedule};
 use super::failure::{Detail, Failure};
 use super::prepare::Record;
 use super::slowness::Slowness;
@@ -17,6 +18,7 @@ pub struct Compiled {
     pub study: Study,
     pub system: System,
     pub model: Model,
+    pub(super) delays: Delays,
 }
 
 impl Compiled {
@@ -25,8 +27,9 @@ impl Compiled {
     pub fn new(study: Study) -> Result<Self, Vec<Diagnostic>> {
         let system = mechanics::derive(&study)?;
         let model = Model::compile(&system);
-        let idle = parameters_without_influence(&study, &model);
-        if idle.is_empty() { Ok(Self { study, system, model }) } else { Err(idle) }
+        let delays = Delays::new(&study);
+        let idle = parameters_without_influence(&study, &model, &delays);
+        if idle.is_empty() { Ok(Self { study, system, model, delays }) } else { Err(idle) }
     }
 
     /// As [`Compiled::new`], with the named parameters held at these values (SI): they become constants of the equations.
@@ -45,19 +48,24 @@ impl Compiled {
         let mut system = mechanics::derive(&study)?;
         system.freeze(&symbols);
         study.parameters.retain(|parameter| fixed.iter().all(|(name, _)| *name != parameter.name));
-        let model = Model::compile(&system);
-        Ok(Self { study, system, model })
+        let values = symbols.iter().map(|(symbol, value)| (*symbol, study.graph.constant(*value))).collect();
+        for measure in &mut study.measures {
+            measure.delay = measure.delay.map(|delay| study.graph.substitute(&[delay], &values)[0]);
+        }
+        let (model, delays) = (Model::compile(&system), Delays::new(&study));
+        Ok(Self { study, system, model, delays })
     }
 }
 
 /// A parameter from which no path leads to any measured channel cannot be identified by any data.
-fn parameters_without_influence(study: &Study, model: &Model) -> Vec<Diagnostic> {
+fn parameters_without_influence(study: &Study, model: &Model, delays: &Delays) -> Vec<Diagnostic> {
     study
         .parameters
         .iter()
         .zip(model.parameter_reach())
-        .filter(|(_, reach)| !reach[..study.measures.len()].contains(&true))
-        .map(|(parameter, _)| {
+        .enumerate()
+        .filter(|(k, (_, reach))| !reach[..study.measures.len()].contains(&true) && !delays.depend_on(*k))
+        .map(|(_, (parameter, _))| {
             Diagnostic::error(
                 Code::NO_INFLUENCE,
                 format!("parameter `{}` has no influence on any measure", parameter.name),
@@ -152,13 +160,14 @@ fn run(
         Failure::from_integration(&record.name, &failure, name, |i| bound.equation_name(i))
     };
     let start = start(compiled, &mut bound, record, with_gradient).map_err(|failure| blame(&bound, failure))?;
-    let mut solution = integrate::integrate(&mut bound, &start, &record.times, &record.breakpoints, &options)
+    let schedule = Schedule::new(&compiled.delays, record, theta).ok_or_else(|| no_schedule(record, start.time))?;
+    let mut solution = integrate::integrate(&mut bound, &start, &schedule.times, &record.breakpoints, &options)
         .map_err(|failure| blame(&bound, failure))?;
     let moved = moved_starts(compiled, &mut bound, record, &start);
     if !moved.is_empty() {
         solution.work.reason += &format!("; start values moved to close the loops: {}", moved.join(", "));
     }
-    let (channels, gradients) = outputs(&mut bound, record, &solution, with_gradient);
+    let (channels, gradients) = outputs(&mut bound, record, &solution, &schedule, with_gradient);
     let finite = channels.iter().flatten().chain(gradients.iter().flatten()).all(|value| value.is_finite());
     if !finite {
         return Err(Failure {
@@ -170,9 +179,23 @@ fn run(
             help: "a measure or criterion divides by zero or takes the root of a negative number".to_owned(),
         });
     }
-    let probes = if with_probes { probes(&mut bound, record, &solution) } else { Vec::new() };
+    let probes = if with_probes { probes(&mut bound, record, &solution, &schedule) } else { Vec::new() };
     let plan = solution.plan.take();
     Ok((Trajectory { channels, gradient: gradients, probes, work: solution.work }, plan))
+}
+
+pub(super) fn no_schedule(record: &Record, time: f64) -> Failure {
+    Failure {
+        experiment: record.name.clone(),
+        time,
+        cause: "the delay of a measure is negative or not a number".to_owned(),
+        component: None,
+        detail: Box::new(Detail {
+            equations: Vec::new(),
+            slowness: Slowness::new(&Work::default(), |_| String::new()),
+        }),
+        help: "bound the parameters of the delay so that it stays above zero".to_owned(),
+    }
 }
 
 pub(super) fn start(
@@ -252,11 +275,12 @@ pub(super) fn options(study: &Study) -> Options {
     }
 }
 
-/// Measured channels (and their gradient) at the compared samples, from the solution at all sample times.
+/// Measured channels (and their gradient) at the compared samples, from the solution at the times of the schedule.
 fn outputs(
     bound: &mut Bound,
     record: &Record,
     solution: &Solution,
+    schedule: &Schedule,
     with_gradient: bool,
 ) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     let model = bound.model();
@@ -267,32 +291,48 @@ fn outputs(
     let mut channels = vec![vec![0.0; samples]; record.measures.len()];
     let mut gradients = vec![vec![0.0; if with_gradient { samples * p } else { 0 }]; record.measures.len()];
     for k in 0..samples {
-        let row = record.first + k;
-        let (t, y) = (solution.times[row], &solution.y[row * n..(row + 1) * n]);
-        bound.outputs(t, y, &mut values);
-        if with_gradient {
-            let block = &solution.sensitivity[row * n * p..(row + 1) * n * p];
-            bound.output_sensitivity(t, y, block, &mut slopes);
-        }
+        let mut evaluated = None;
         for (c, &measure) in record.measures.iter().enumerate() {
-            channels[c][k] = values[measure];
-            if with_gradient {
-                for j in 0..p {
-                    gradients[c][j * samples + k] = slopes[j * m + measure];
+            let row = schedule.row(c, k);
+            let (t, y) = (solution.times[row], &solution.y[row * n..(row + 1) * n]);
+            // Channels without delay share an instant.
+            if evaluated.replace(row) != Some(row) {
+                bound.outputs(t, y, &mut values);
+                if with_gradient {
+                    let block = &solution.sensitivity[row * n * p..(row + 1) * n * p];
+                    bound.output_sensitivity(t, y, block, &mut slopes);
                 }
+            }
+            channels[c][k] = values[measure];
+            if !with_gradient {
+                continue;
+            }
+            for j in 0..p {
+                gradients[c][j * samples + k] = slopes[j * m + measure];
+            }
+            let mut others = vec![0.0; m];
+            let through_delay = schedule.slopes(c, k, |row| output(bound, solution, row, measure, &mut others));
+            for (j, slope) in through_delay.into_iter().flatten().enumerate() {
+                gradients[c][j * samples + k] += slope;
             }
         }
     }
     (channels, gradients)
 }
 
-fn probes(bound: &mut Bound, record: &Record, solution: &Solution) -> Vec<Vec<f64>> {
+/// One output at one row of a solution.
+fn output(bound: &mut Bound, solution: &Solution, row: usize, measure: usize, values: &mut [f64]) -> f64 {
+    let n = bound.model().dimension();
+    bound.outputs(solution.times[row], &solution.y[row * n..(row + 1) * n], values);
+    values[measure]
+}
+
+fn probes(bound: &mut Bound, record: &Record, solution: &Solution, schedule: &Schedule) -> Vec<Vec<f64>> {
     let model = bound.model();
     let (n, count) = (model.dimension(), model.probe_count());
     let mut values = vec![0.0; count];
     let mut histories = vec![vec![0.0; record.sample_count()]; count];
-    for k in 0..record.sample_count() {
-        let row = record.first + k;
+    for (k, &row) in schedule.base.iter().enumerate() {
         bound.probes(solution.times[row], &solution.y[row * n..(row + 1) * n], &mut values);
         for (history, value) in histories.iter_mut().zip(&values) {
             history[k] = *value;

@@ -45,6 +45,9 @@ pub struct Stretches<'a> {
 
 /// Why a model cannot be taken stretch by stretch: its states are not free.
 pub fn stretches_refused(compiled: &Compiled) -> Option<&'static str> {
+    if compiled.study.measures.iter().any(|measure| measure.delay.is_some()) {
+        return Some("a measure has a delay: what it shows is no function of the present state");
+    }
     if compiled.model.state_count() < compiled.model.dimension() {
         return Some("the mechanism has loops: its states cannot be moved one by one");
     }

@@ -1,9 +1,10 @@
 //! The derivative of a run in one direction of the parameters by dual numbers: an explicit model and its variation as one
 //! system of twice the size, along a recorded sequence of steps.
 
+use super::delay::Schedule;
 use super::failure::Failure;
 use super::prepare::Record;
-use super::run::{Compiled, options, start};
+use super::run::{Compiled, no_schedule, options, start};
 use crate::integrate::{self, Dynamics, Options, Plan, Start};
 use crate::linear::SparsityPattern;
 use crate::tape::{Bound, Tangent};
@@ -34,16 +35,27 @@ pub(super) fn tangent(
     let variation = bound.tangent(direction);
     let mut doubled = Doubled::new(&mut bound, variation);
     let options = Options { follow_plan: Some(plan), ..options(&compiled.study) };
-    let outcome = integrate::integrate(&mut doubled, &start, &record.times, &record.breakpoints, &options);
+    let schedule = Schedule::new(&compiled.delays, record, theta).ok_or_else(|| no_schedule(record, start.time))?;
+    let outcome = integrate::integrate(&mut doubled, &start, &schedule.times, &record.breakpoints, &options);
     let solution = outcome.map_err(|failure| blame(doubled.bound, failure))?;
     let Doubled { bound, mut variation, .. } = doubled;
     let n = compiled.model.dimension();
     let mut slopes = vec![0.0; compiled.model.output_count()];
-    let mut channels = vec![Vec::with_capacity(record.sample_count()); record.measures.len()];
-    for row in record.first..record.times.len() {
-        let (y, s) = solution.y[2 * n * row..2 * n * (row + 1)].split_at(n);
-        bound.outputs_tangent(&mut variation, solution.times[row], (y, s), &mut slopes);
-        channels.iter_mut().zip(&record.measures).for_each(|(channel, &measure)| channel.push(slopes[measure]));
+    let mut values = slopes.clone();
+    let mut channels = vec![vec![0.0; record.sample_count()]; record.measures.len()];
+    for k in 0..record.sample_count() {
+        for (c, &measure) in record.measures.iter().enumerate() {
+            let row = schedule.row(c, k);
+            let (y, s) = solution.y[2 * n * row..2 * n * (row + 1)].split_at(n);
+            bound.outputs_tangent(&mut variation, solution.times[row], (y, s), &mut slopes);
+            let through_delay = schedule.slopes(c, k, |row| {
+                bound.outputs(solution.times[row], &solution.y[2 * n * row..2 * n * row + n], &mut values);
+                values[measure]
+            });
+            let moved: f64 =
+                through_delay.map_or(0.0, |slopes| slopes.iter().zip(direction).map(|(slope, d)| slope * d).sum());
+            channels[c][k] = slopes[measure] + moved;
+        }
     }
     Ok(channels)
 }

@@ -260,7 +260,7 @@ impl<'a> Checker<'a> {
             roots.extend(joint.axes.iter().filter_map(|axis| axis.prescribed));
         }
         roots.extend(self.states.iter().flat_map(|state| [state.derivative, state.initial]));
-        roots.extend(measures.iter().map(|measure| measure.value));
+        roots.extend(measures.iter().flat_map(|measure| [Some(measure.value), measure.delay]).flatten());
         roots.extend(self.point_quantities.iter().flat_map(|quantity| quantity.point.position));
         roots.extend(
             experiments.iter().flat_map(|experiment| experiment.start.overrides.iter().map(|(_, value)| *value)),

@@ -99,6 +99,12 @@ impl<'a> Checker<'a> {
         let value = self.field_value(&path, expression, Allowed::Constant)?;
         let because = format!("`{key}`");
         let value = self.expect(value, expression.span, wanted, (field.key.span, &because), SCOPE)?;
+        if key == "delay" && self.graph.constant_value(value.node).is_some_and(|delay| delay < 0.0) {
+            let diagnostic = Diagnostic::error(Code::WRONG_VALUE, "a delay must not be negative")
+                .label(expression.span, "below zero")
+                .help("a sensor does not know the future; delay the other channels instead");
+            return self.fail(diagnostic, SCOPE);
+        }
         if key == "lag" && self.graph.constant_value(value.node).is_some_and(|lag| lag <= 0.0) {
             let diagnostic = Diagnostic::error(Code::WRONG_VALUE, "a lag must be positive")
                 .label(expression.span, "not above zero")
@@ -114,7 +120,7 @@ impl<'a> Checker<'a> {
         let mut measures = Vec::new();
         for (index, measure) in declared.measures.iter().enumerate() {
             let name = measure.name.text.clone();
-            let known = ["noise", "weight", "lag", "gain", "offset"];
+            let known = ["noise", "weight", "lag", "delay", "gain", "offset", "quantisation"];
             self.known_fields(&format!("measure `{name}`"), measure.fields, &known);
             let zero = self.graph.constant(0.0);
             let value = self.site_value(Site::Measure(index), measure.name.span);
@@ -124,19 +130,24 @@ impl<'a> Checker<'a> {
                 Some(Ok(unit)) => unit,
                 _ => Unit::coherent(value.dimension),
             };
-            let noise = self.measure_noise(index, &unit);
+            let delay = self.sensor_field(index, "delay", Dimension::TIME).flatten().map(|delay| delay.node);
+            let quantisation = self.measure_difference(index, "quantisation", &unit);
+            // Rounding to steps q is noise of the variance q^2 / 12 (Widrow-1961).
+            let noise = self.measure_difference(index, "noise", &unit);
+            let noise = noise.map(|noise| noise.hypot(quantisation.unwrap_or(0.0) / 12f64.sqrt()));
             let weight = self.measure_number(index, "weight", Dimension::ONE).unwrap_or(1.0);
             let (title, span) = (text_of(measure.title), measure.name.span);
-            measures.push(Measure { name, title, unit, value: value.node, noise, weight, span });
+            let value = value.node;
+            measures.push(Measure { name, title, unit, value, noise, weight, delay, quantisation, span });
         }
         measures
     }
 
-    /// The noise is a difference: the offset of a unit does not count.
-    fn measure_noise(&mut self, index: usize, unit: &Unit) -> Option<f64> {
-        let noise = self.measure_number(index, "noise", unit.dimension)?;
+    /// Noise and rounding are differences: the offset of a unit does not count.
+    fn measure_difference(&mut self, index: usize, key: &str, unit: &Unit) -> Option<f64> {
+        let noise = self.measure_number(index, key, unit.dimension)?;
         let declared: &'a super::declarations::Declarations<'a> = self.declared;
-        let field = find(declared.measures[index].fields, "noise")?;
+        let field = find(declared.measures[index].fields, key)?;
         let written = self.field_expression(field).and_then(super::identify::written_unit);
         let offset = written.and_then(|unit| read_unit(unit).ok()).map_or(0.0, |unit| unit.offset);
         Some(noise - offset)

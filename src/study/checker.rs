@@ -104,6 +104,8 @@ pub(super) struct Checker<'a> {
     pub declared: &'a Declarations<'a>,
     /// `None`: wrong, as reported.
     pub tables: HashMap<&'a str, Option<Table>>,
+    /// What `wavenumber` means in the formula of a spectrum.
+    pub wavenumber: Option<super::evaluate::Typed>,
     pub graph: Graph,
     pub time: Symbol,
     pub diagnostics: Vec<Diagnostic>,
@@ -156,6 +158,7 @@ impl<'a> Checker<'a> {
             loaded,
             declared,
             tables: HashMap::new(),
+            wavenumber: None,
             graph,
             time,
             diagnostics,

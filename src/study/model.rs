@@ -367,11 +367,22 @@ pub struct Measure {
     pub unit: Unit,
     /// May contain joint accelerations and point quantities.
     pub value: Node,
-    /// Standard deviation of the noise in SI where the study states it.
+    /// Standard deviation of the noise in SI where the study states it, that of the rounding included.
     pub noise: Option<f64>,
     /// Further factor on the channel's residual; 1 unless stated.
     pub weight: f64,
+    /// By which the channel shows the value late, s; of parameters and numbers.
+    pub delay: Option<Node>,
+    /// Step to whose multiples the sensor rounds, SI.
+    pub quantisation: Option<f64>,
     pub span: Span,
+}
+
+impl Measure {
+    /// What the sensor shows of a value: rounded to its steps.
+    pub fn shown(&self, value: f64) -> f64 {
+        self.quantisation.map_or(value, |step| (value / step).round() * step)
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

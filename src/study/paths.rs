@@ -21,6 +21,7 @@ impl<'a> Checker<'a> {
     fn study_path(&mut self, name: &'a Name, allowed: Allowed) -> Option<Typed> {
         match name.text.as_str() {
             "pi" => return Some(Typed::new(self.graph.constant(std::f64::consts::PI), Dimension::ONE)),
+            "wavenumber" if self.wavenumber.is_some() => return self.wavenumber,
             _ if allowed == Allowed::Number => return self.only_a_number(name),
             "t" => {
                 self.check_varies(name, allowed)?;
@@ -71,7 +72,11 @@ impl<'a> Checker<'a> {
     fn constant(&mut self, index: usize, name: &'a Name) -> Option<Typed> {
         let constant = &self.declared.constants[index];
         self.once(Key::Constant(index), name.span, |checker| {
-            checker.field_value(&constant.name.text, constant.value, Allowed::Constant)
+            // Constants are the same everywhere, also where a spectrum mentions them.
+            let hidden = checker.wavenumber.take();
+            let value = checker.field_value(&constant.name.text, constant.value, Allowed::Constant);
+            checker.wavenumber = hidden;
+            value
         })
     }
 

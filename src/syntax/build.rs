@@ -99,6 +99,7 @@ fn is_keyword(rule: Rule) -> bool {
             | constrain_word
             | table_word
             | points_word
+            | harmonics_word
             | add_word
             | remove_word
             | replace_word

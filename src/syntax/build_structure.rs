@@ -66,7 +66,8 @@ impl Builder<'_> {
             arguments.push(self.declared(pair, String::new())?);
         }
         let result = self.type_expression(parts.next()?)?;
-        let (mut points, mut fields, mut spans) = (None, Vec::new(), Vec::new());
+        let (mut points, mut harmonics) = (None, None);
+        let (mut fields, mut spans) = (Vec::new(), Vec::new());
         while let Some(pair) = parts.next() {
             let span = self.span(&pair);
             spans.push(span);
@@ -74,14 +75,18 @@ impl Builder<'_> {
                 fields.push(self.field(pair)?);
                 continue;
             }
-            let pairs = self.points(Parts::of(pair));
-            match &points {
-                Some((_, first)) => self.report_repeated("the table has two lists of points", span, *first),
-                None => points = Some((pairs, span)),
+            let (list, what) = match pair.as_rule() {
+                Rule::harmonics => (&mut harmonics, "the table has two lists of harmonics"),
+                _ => (&mut points, "the table has two lists of points"),
+            };
+            let tuples = self.points(Parts::of(pair));
+            match list {
+                Some((_, first)) => self.report_repeated(what, span, *first),
+                None => *list = Some((tuples, span)),
             }
         }
         self.check_separators(&spans);
-        Some(ItemKind::Table(TableDeclaration { name, arguments, result, points, fields }))
+        Some(ItemKind::Table(TableDeclaration { name, arguments, result, points, harmonics, fields }))
     }
 
     fn points(&mut self, mut parts: Parts<'_>) -> Vec<Vec<Expression>> {

@@ -117,14 +117,15 @@ fn table_text(table: &TableDeclaration) -> String {
     let arguments: Vec<String> = table.arguments.iter().map(declared).collect();
     let head = format!("table {}({}) -> {}", table.name.text, arguments.join(", "), type_text(&table.result));
     let mut lines = Vec::new();
-    if let Some((points, _)) = &table.points {
-        let points: Vec<String> = points.iter().map(|point| tuple(point)).collect();
-        let line = format!("points = ({})", points.join(", "));
+    for (word, list) in [("points", &table.points), ("harmonics", &table.harmonics)] {
+        let Some((tuples, _)) = list else { continue };
+        let tuples: Vec<String> = tuples.iter().map(|entries| tuple(entries)).collect();
+        let line = format!("{word} = ({})", tuples.join(", "));
         lines.push(if line.chars().count() < WIDTH {
             line
         } else {
-            let points: String = points.iter().map(|point| format!("  {point},\n")).collect();
-            format!("points = (\n{points})")
+            let tuples: String = tuples.iter().map(|entries| format!("  {entries},\n")).collect();
+            format!("{word} = (\n{tuples})")
         });
     }
     lines.extend(field_lines(&table.fields));

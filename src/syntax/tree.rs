@@ -283,6 +283,8 @@ pub struct TableDeclaration {
     pub result: TypeExpression,
     /// `points = ((x, y), ...)`: the pairs, and where they stand.
     pub points: Option<(Vec<Vec<Expression>>, Span)>,
+    /// `harmonics = ((order or period, amplitude, phase), ...)`, and where they stand.
+    pub harmonics: Option<(Vec<Vec<Expression>>, Span)>,
     pub fields: Vec<Field>,
 }
 

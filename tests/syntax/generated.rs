@@ -126,10 +126,11 @@ fn identify() -> impl Strategy<Value = String> {
 
 fn table() -> impl Strategy<Value = String> {
     let point = (number(), number()).prop_map(|(x, y)| format!("(-{x}, {y})"));
-    (name(), declared(), types(), prop::collection::vec(point, 1..12), select(vec![", ", ",\n"])).prop_map(
-        |(name, argument, result, points, separator)| {
+    let word = select(vec!["points", "harmonics"]);
+    (name(), declared(), types(), prop::collection::vec(point, 1..12), select(vec![", ", ",\n"]), word).prop_map(
+        |(name, argument, result, points, separator, word)| {
             let points = points.join(separator);
-            format!("table {name}({argument}) -> {result} {{ points = ({points})\n interpolation = linear }}")
+            format!("table {name}({argument}) -> {result} {{ {word} = ({points})\n interpolation = linear }}")
         },
     )
 }

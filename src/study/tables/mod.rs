@@ -5,6 +5,7 @@
 
 mod curve;
 mod file;
+mod series;
 
 use super::checker::{Allowed, Checker, Scope};
 use super::evaluate::Typed;
@@ -38,10 +39,17 @@ type Points = (Vec<(f64, f64)>, [Dimension; 2]);
 pub(super) struct Table {
     argument: Dimension,
     value: Dimension,
-    /// Growing.
-    arguments: Vec<f64>,
-    pieces: Vec<[f64; 4]>,
-    beyond: Beyond,
+    shape: TableShape,
+}
+
+enum TableShape {
+    /// Arguments grow.
+    Pieces {
+        arguments: Vec<f64>,
+        pieces: Vec<[f64; 4]>,
+        beyond: Beyond,
+    },
+    Sum(Vec<series::Component>),
 }
 
 impl<'a> Checker<'a> {
@@ -60,6 +68,9 @@ impl<'a> Checker<'a> {
 
     fn read_table(&mut self, table: &'a TableDeclaration) -> Option<Table> {
         let owner = format!("table `{}`", table.name.text);
+        if table.harmonics.is_some() || find(&table.fields, "spectrum").is_some() {
+            return self.read_series(table);
+        }
         self.known_fields(&owner, &table.fields, &["file", "interpolation", "extrapolation", "points"]);
         let [argument] = table.arguments.as_slice() else {
             let message = format!("{owner} has {} arguments", table.arguments.len());
@@ -103,7 +114,8 @@ impl<'a> Checker<'a> {
             _ => Beyond::Error,
         };
         let arguments = points.iter().map(|point| point.0).collect();
-        Some(Table { argument: dimensions[0], value: dimensions[1], arguments, pieces, beyond })
+        let shape = TableShape::Pieces { arguments, pieces, beyond };
+        Some(Table { argument: dimensions[0], value: dimensions[1], shape })
     }
 
     /// A field with one of these words; it must be given.
@@ -228,20 +240,24 @@ impl<'a> Checker<'a> {
 
     fn lowered(&mut self, name: &str, x: Node) -> Option<Node> {
         let table = self.tables.get(name)?.as_ref()?;
-        let (first, last) = (*table.arguments.first()?, *table.arguments.last()?);
         let graph = &mut self.graph;
+        let (arguments, pieces, beyond) = match &table.shape {
+            TableShape::Pieces { arguments, pieces, beyond } => (arguments, pieces, *beyond),
+            TableShape::Sum(components) => return Some(series::sum(graph, components, x)),
+        };
+        let (first, last) = (*arguments.first()?, *arguments.last()?);
         let (low, high) = (graph.constant(first), graph.constant(last));
-        if table.beyond == Beyond::Constant {
+        if beyond == Beyond::Constant {
             let above = graph.binary(Binary::Maximum, x, low);
             let x = graph.binary(Binary::Minimum, above, high);
-            return Some(tree(graph, &table.arguments, &table.pieces, x));
+            return Some(tree(graph, arguments, pieces, x));
         }
-        let inside = tree(graph, &table.arguments, &table.pieces, x);
-        let end = table.pieces.last().copied().unwrap_or_default();
-        let (width, [a, b, c, d]) = (last - table.arguments[table.pieces.len() - 1], end);
+        let inside = tree(graph, arguments, pieces, x);
+        let end = pieces.last().copied().unwrap_or_default();
+        let (width, [a, b, c, d]) = (last - arguments[pieces.len() - 1], end);
         let at_end = [a + width * (b + width * (c + width * d)), b + width * (2.0 * c + 3.0 * d * width)];
-        let at_begin = table.pieces.first().map(|piece| [piece[0], piece[1]])?;
-        let (below, above) = if table.beyond == Beyond::Linear {
+        let at_begin = pieces.first().map(|piece| [piece[0], piece[1]])?;
+        let (below, above) = if beyond == Beyond::Linear {
             let below = polynomial(graph, x, first, [at_begin[0], at_begin[1], 0.0, 0.0]);
             (below, polynomial(graph, x, last, [at_end[0], at_end[1], 0.0, 0.0]))
         } else {
