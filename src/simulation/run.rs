@@ -288,6 +288,7 @@ fn outputs(
     let samples = record.sample_count();
     let mut values = vec![0.0; m];
     let mut slopes = vec![0.0; m * p];
+    let mut others = values.clone();
     let mut channels = vec![vec![0.0; samples]; record.measures.len()];
     let mut gradients = vec![vec![0.0; if with_gradient { samples * p } else { 0 }]; record.measures.len()];
     for k in 0..samples {
@@ -310,7 +311,6 @@ fn outputs(
             for j in 0..p {
                 gradients[c][j * samples + k] = slopes[j * m + measure];
             }
-            let mut others = vec![0.0; m];
             let through_delay = schedule.slopes(c, k, |row| output(bound, solution, row, measure, &mut others));
             for (j, slope) in through_delay.into_iter().flatten().enumerate() {
                 gradients[c][j * samples + k] += slope;

@@ -43,8 +43,8 @@ pub(super) fn tangent(
     let mut slopes = vec![0.0; compiled.model.output_count()];
     let mut values = slopes.clone();
     let mut channels = vec![vec![0.0; record.sample_count()]; record.measures.len()];
-    for k in 0..record.sample_count() {
-        for (c, &measure) in record.measures.iter().enumerate() {
+    for (c, (channel, &measure)) in channels.iter_mut().zip(&record.measures).enumerate() {
+        for (k, value) in channel.iter_mut().enumerate() {
             let row = schedule.row(c, k);
             let (y, s) = solution.y[2 * n * row..2 * n * (row + 1)].split_at(n);
             bound.outputs_tangent(&mut variation, solution.times[row], (y, s), &mut slopes);
@@ -54,7 +54,7 @@ pub(super) fn tangent(
             });
             let moved: f64 =
                 through_delay.map_or(0.0, |slopes| slopes.iter().zip(direction).map(|(slope, d)| slope * d).sum());
-            channels[c][k] = slopes[measure] + moved;
+            *value = slopes[measure] + moved;
         }
     }
     Ok(channels)

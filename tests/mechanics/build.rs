@@ -202,6 +202,8 @@ impl Builder {
             value,
             noise: None,
             weight: 1.0,
+            delay: None,
+            quantisation: None,
             span: Span::default(),
         });
     }
