@@ -464,3 +464,37 @@ solver { tolerance = 1e-9 }
         assert!((own["N"][sample] - 3.0 * 9.81).abs() < 1e-6);
     }
 }
+
+/// Rates of a free rotation are about the axes of the child, however these stand at the start.
+#[test]
+fn a_child_turned_at_rest_turns_about_its_own_axes() {
+    let rates = |orientation: &str| {
+        let text = format!(
+            r#"
+study tumbling
+body b {{ mass = 1 kg, inertia = (0.1, 0.2, 0.25 kg*m^2) }}
+joint ball: spherical ground -> b {{ {orientation} }}
+measure wx [rad/s] = ball.angular_velocity.x
+measure wy [rad/s] = ball.angular_velocity.y
+measure wz [rad/s] = ball.angular_velocity.z
+measure ax = b.axis_x.x
+measure bx [rad/s] = b.angular_velocity.x
+experiment run {{
+  data = "run.csv"
+  start = rest {{ ball.angular_velocity.x = 1 rad/s, ball.angular_velocity.y = 3 rad/s, ball.angular_velocity.z = 0.2 rad/s }}
+}}
+solver {{ tolerance = 1e-10 }}
+"#
+        );
+        simulated("tumbling", &text, &times_only(&["wx [rad/s]", "wy [rad/s]", "wz [rad/s]", "ax", "bx [rad/s]"], 4.0))
+    };
+    let (straight, turned) = (rates(""), rates("orientation = (0 deg, 0 deg, 30 deg)"));
+    for name in ["wx", "wy", "wz"] {
+        for (a, b) in straight[name].iter().zip(&turned[name]) {
+            assert!((a - b).abs() < 1e-7, "{name}: {a} and {b}");
+        }
+    }
+    let (sine, cosine) = 30_f64.to_radians().sin_cos();
+    assert!((turned["ax"][0] - cosine).abs() < 1e-12);
+    assert!((turned["bx"][0] - (cosine - 3.0 * sine)).abs() < 1e-12);
+}

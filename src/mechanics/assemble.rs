@@ -81,7 +81,7 @@ fn position_rates(graph: &mut Graph, tree: &Tree, link: usize, projection: &[Nod
             let velocity = graph.variable(symbols.velocity);
             vec![graph.add(velocity, projection[link])]
         }
-        Coordinate::Rotation { symbols, component: 0 } => {
+        Coordinate::Rotation { symbols, component: 0, .. } => {
             let rate = |graph: &mut Graph, k: usize| {
                 let own = graph.variable(symbols.velocity[k]);
                 graph.add(own, projection[link + k])
@@ -153,7 +153,7 @@ fn state_variables(study: &Study, tree: &Tree, moving: &[usize]) -> Vec<Variable
                 positions.push(variable(symbols.position, position, VariableKind::Position, 0.0));
                 velocities.push(variable(symbols.velocity, velocity, VariableKind::Velocity, 0.0));
             }
-            Coordinate::Rotation { symbols, component } => {
+            Coordinate::Rotation { symbols, component, .. } => {
                 if component == 0 {
                     positions.extend(symbols.quaternion.iter().enumerate().map(|(i, &symbol)| {
                         variable(symbol, position, VariableKind::Position, f64::from(u8::from(i == 0)))

@@ -232,7 +232,7 @@ fn add_accelerations(
             | Coordinate::Mode { symbols, .. } => {
                 meaning.insert(symbols.acceleration, acceleration);
             }
-            Coordinate::Rotation { symbols, component } => {
+            Coordinate::Rotation { symbols, component, .. } => {
                 meaning.insert(symbols.acceleration[component], acceleration);
             }
             Coordinate::Weld | Coordinate::Follower { .. } => {}

@@ -30,7 +30,7 @@ pub(super) fn refuse_missing_inertia(
             Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => {
                 point.insert(symbols.position, general);
             }
-            Coordinate::Rotation { symbols, component: 0 } => {
+            Coordinate::Rotation { symbols, component: 0, .. } => {
                 symbols.quaternion.iter().zip([0.8, 0.3, -0.4, 0.2]).for_each(|(&symbol, value)| {
                     point.insert(symbol, value + 0.01 * number as f64);
                 });

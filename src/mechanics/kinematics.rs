@@ -48,9 +48,11 @@ fn relative_placement(graph: &mut Graph, link: &Link) -> (Matrix, Vector) {
         Coordinate::Free { symbols, .. } => graph.variable(symbols.position),
         Coordinate::Prescribed { motion, .. } => motion[0],
         Coordinate::Follower { position, .. } => position,
-        Coordinate::Rotation { symbols, component: 0 } => {
+        Coordinate::Rotation { symbols, component: 0, axes } => {
             let quaternion = symbols.quaternion.map(|symbol| graph.variable(symbol));
-            return (vector::rotation_of_quaternion(graph, quaternion), vector::zero(graph));
+            let about_axes = vector::rotation_of_quaternion(graph, quaternion);
+            let rotation = vector::multiply(graph, axes, about_axes);
+            return (vector::multiply(graph, rotation, vector::transpose(axes)), vector::zero(graph));
         }
         Coordinate::Rotation { .. } | Coordinate::Weld | Coordinate::Mode { .. } => {
             return (vector::identity(graph), vector::zero(graph));
@@ -67,7 +69,10 @@ fn relative_placement(graph: &mut Graph, link: &Link) -> (Matrix, Vector) {
 fn rate_in_bias(graph: &mut Graph, link: &Link) -> (Vector, Vector) {
     let zero = vector::zero(graph);
     match link.coordinate {
-        Coordinate::Rotation { symbols, component: 0 } => (symbols.velocity.map(|s| graph.variable(s)), zero),
+        Coordinate::Rotation { symbols, component: 0, axes } => {
+            let rates = symbols.velocity.map(|symbol| graph.variable(symbol));
+            (vector::apply(graph, axes, rates), zero)
+        }
         Coordinate::Rotation { .. } | Coordinate::Weld | Coordinate::Mode { .. } => (zero, zero),
         Coordinate::Free { .. } | Coordinate::Prescribed { .. } | Coordinate::Follower { .. } => {
             let rate = link.rate(graph);

@@ -74,7 +74,7 @@ impl Linkage {
                     freedoms.push(Freedom { rate: symbols.velocity, change, is_turn, is_elastic });
                     values.insert(symbols.position, 0.0);
                 }
-                Coordinate::Rotation { symbols, component } => {
+                Coordinate::Rotation { symbols, component, .. } => {
                     let change = Change::Quaternion(symbols.quaternion, component);
                     freedoms.push(Freedom { rate: symbols.velocity[component], change, is_turn, is_elastic: false });
                     symbols.quaternion.iter().enumerate().for_each(|(i, &s)| {

@@ -37,8 +37,9 @@ pub(super) enum Coordinate {
     Free { symbols: JointSymbols, at: usize },
     /// Position, velocity, acceleration are given.
     Prescribed { symbols: JointSymbols, at: usize, motion: [Node; 3] },
-    /// One of the three components of a free rotation. The first carries the whole rotation of the frame.
-    Rotation { symbols: RotationSymbols, component: usize },
+    /// One of the three components of a free rotation, along the axes (columns of `axes`, in the frame) of the body that it
+    /// carries. The first carries the whole rotation of the frame.
+    Rotation { symbols: RotationSymbols, component: usize, axes: Matrix },
     /// No motion; only there because what it transmits is asked for.
     Weld,
     /// The coordinate of a mode of an elastic body. The frame does not move by it; frames of the body follow.
@@ -54,7 +55,7 @@ impl Link {
             Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => {
                 Some((symbols.velocity, symbols.acceleration))
             }
-            Coordinate::Rotation { symbols, component } => {
+            Coordinate::Rotation { symbols, component, .. } => {
                 Some((symbols.velocity[component], symbols.acceleration[component]))
             }
             Coordinate::Prescribed { .. } | Coordinate::Weld | Coordinate::Follower { .. } => None,
@@ -66,7 +67,7 @@ impl Link {
         match self.coordinate {
             Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => graph.variable(symbols.velocity),
             Coordinate::Follower { velocity, .. } => velocity,
-            Coordinate::Rotation { symbols, component } => graph.variable(symbols.velocity[component]),
+            Coordinate::Rotation { symbols, component, .. } => graph.variable(symbols.velocity[component]),
             Coordinate::Prescribed { motion, .. } => motion[1],
             Coordinate::Weld => graph.constant(0.0),
         }
@@ -265,7 +266,7 @@ impl Tree {
         let (parent_rotation, rotation) = rotations(graph, joint, is_reversed, place.rotation);
         let mut frame = place.link;
         let mut offset = place.offset;
-        let mut motions = motions(graph, study, joint, is_reversed, parent_rotation);
+        let mut motions = motions(graph, study, joint, is_reversed, (parent_rotation, rotation));
         if motions.is_empty() && is_asked {
             motions.push((Axis::Turn(vector::zero(graph)), Coordinate::Weld));
         }
@@ -298,7 +299,7 @@ fn motions(
     study: &Study,
     joint: &Joint,
     is_reversed: bool,
-    parent_rotation: Matrix,
+    (parent_rotation, outer_rotation): (Matrix, Matrix),
 ) -> Vec<(Axis, Coordinate)> {
     let mut result = Vec::new();
     for (at, axis) in joint.axes.iter().enumerate() {
@@ -327,8 +328,8 @@ fn motions(
     }
     if let Some(symbols) = joint.rotation {
         let components = (0..3).map(|component| {
-            let axis = std::array::from_fn(|i| graph.constant(if i == component { 1.0 } else { 0.0 }));
-            (Axis::Turn(axis), Coordinate::Rotation { symbols, component })
+            let axis = outer_rotation.map(|row| row[component]);
+            (Axis::Turn(axis), Coordinate::Rotation { symbols, component, axes: outer_rotation })
         });
         let components: Vec<_> = components.collect();
         if is_reversed {
