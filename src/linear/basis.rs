@@ -57,6 +57,9 @@ pub fn least_squares(columns: &[f64], rows: usize, target: &[f64]) -> Option<Vec
         return None;
     }
     let count = columns.len() / rows;
+    if count == 0 {
+        return Some(Vec::new());
+    }
     let mut matrix = DMatrix::from_column_slice(rows, count, columns);
     let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
     for (mut column, &norm) in matrix.column_iter_mut().zip(&norms) {
@@ -74,6 +77,11 @@ pub fn least_squares(columns: &[f64], rows: usize, target: &[f64]) -> Option<Vec
 #[cfg(test)]
 mod tests {
     use super::{Basis, least_squares};
+
+    #[test]
+    fn nothing_is_fitted_by_no_columns() {
+        assert_eq!(least_squares(&[], 3, &[1.0, 2.0, 3.0]), Some(Vec::new()));
+    }
 
     #[test]
     fn projection_leaves_nothing_of_the_columns_and_keeps_the_rest() {
