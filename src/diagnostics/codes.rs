@@ -361,11 +361,13 @@ codes! {
      along one axis only needs `joint guide: prismatic(z) ground -> body`.\n"
 
     CLOSED_LOOP "E0302" "joint cannot close its loop"
-    "Joints form loops; the tool lets all but one of them carry bodies and turns the last into constraints. Joints that carry force\n\
-     elements are kept, then those with the least freedom; among equals the last one declared closes the loop. A joint whose motion\n\
-     is prescribed, or that shifts on both sides of a turn, cannot be the one that closes: another one of the loop must be.\n\
+    "Joints form loops; the tool lets all but one of them carry bodies and turns the last into constraints. Joints whose motion is\n\
+     prescribed and those that shift between two turns are kept, then those that carry force elements, then those with the least\n\
+     freedom; among equals the last one declared closes the loop. A joint that shifts between two turns cannot be the one that\n\
+     closes, nor can a force element stand on an axis whose coordinate the positions of the bodies do not tell.\n\
+     List the shifts of such a joint before its turns, or let the element act between the bodies:\n\
      \n\
-     \x20   joint coupler: revolute(y) crank.tip -> rod\n"
+     \x20   joint slot: axes(shift x, turn z, turn y) arm.tip -> slider\n"
 
     NO_INERTIA "E0303" "joint moves no inertia"
     "The acceleration of a coordinate is its load divided by the inertia that moves with it. A joint whose outer bodies have no\n\
@@ -417,6 +419,21 @@ codes! {
      inertia, and all modes together take no more than there is. Otherwise no body has these modes: the shapes are scaled otherwise\n\
      (to a largest deflection of 1, or for other units), or `mass` and `inertia` of the body do not belong to them.\n\
      Divide every shape by the root of its modal mass in kg.\n"
+
+    MOTIONS_CONTRADICT "E0314" "prescribed motions contradict each other"
+    "Every prescribed motion takes one freedom of the mechanism. Where loops hold it already - two driven cranks of one four-bar\n\
+     linkage - the motions would have to fit each other exactly, which no joint without play does.\n\
+     Prescribe only as many motions as the mechanism has freedoms, or let one of them act through an elastic element:\n\
+     \n\
+     \x20   joint drive: revolute(y) ground -> crank { motion = 2 rad/s * t }\n\
+     \x20   force servo: spring_damper on rocker_hinge { stiffness = 20 kN*m/rad, damping = 100 N*m*s/rad }\n"
+
+    SEVERAL_POSITIONS "E0315" "loops that can be assembled in several ways"
+    "A four-bar linkage stands elbow up or elbow down. Where the drawn position (all coordinates zero) or the start is near one of\n\
+     them, that one is meant. Here it is far from both, so that the tool had to choose, and says so.\n\
+     Give the coordinate of one of the joints roughly; it is moved to where the loops close:\n\
+     \n\
+     \x20   start = rest { elbow.position = 70 deg }\n"
 
     IMPACT_IN_LOOP "E0312" "impulse in a mechanism with loops"
     "An event that changes the rate of a force element does so by an impulse. In a mechanism with closed loops the closing\n\

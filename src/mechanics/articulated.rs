@@ -297,7 +297,7 @@ pub(super) fn articulated_bodies(
 fn given_acceleration(graph: &mut Graph, link: &Link) -> Option<Node> {
     match link.coordinate {
         Coordinate::Prescribed { motion, .. } => Some(motion[2]),
-        Coordinate::Weld => Some(graph.constant(0.0)),
+        Coordinate::Turned { .. } | Coordinate::Weld => Some(graph.constant(0.0)),
         Coordinate::Free { .. }
         | Coordinate::Rotation { .. }
         | Coordinate::Mode { .. }

@@ -91,13 +91,14 @@ fn position_rates(graph: &mut Graph, tree: &Tree, link: usize, projection: &[Nod
         }
         Coordinate::Rotation { .. }
         | Coordinate::Prescribed { .. }
+        | Coordinate::Turned { .. }
         | Coordinate::Weld
         | Coordinate::Follower { .. } => vec![],
     }
 }
 
 /// `q' = q (0, w) / 2 + k (1 - |q|^2) q`.
-fn quaternion_rates(graph: &mut Graph, quaternion: [Symbol; 4], rates: Vector) -> Vec<Node> {
+pub(super) fn quaternion_rates(graph: &mut Graph, quaternion: [Symbol; 4], rates: Vector) -> Vec<Node> {
     let [w, x, y, z] = quaternion.map(|symbol| graph.variable(symbol));
     let [a, b, c] = rates;
     let mut sum = |terms: [(Node, Node, f64); 3]| {
@@ -161,7 +162,10 @@ fn state_variables(study: &Study, tree: &Tree, moving: &[usize]) -> Vec<Variable
                 }
                 velocities.push(variable(symbols.velocity[component], velocity, VariableKind::Velocity, 0.0));
             }
-            Coordinate::Prescribed { .. } | Coordinate::Weld | Coordinate::Follower { .. } => {}
+            Coordinate::Prescribed { .. }
+            | Coordinate::Turned { .. }
+            | Coordinate::Weld
+            | Coordinate::Follower { .. } => {}
         }
     }
     let laws = study.states.iter().map(|state| variable(state.symbol, state.dimension, VariableKind::Law, 0.0));
@@ -273,7 +277,10 @@ fn refuse_unknown_symbols(study: &Study, tree: &Tree, system: &System) -> Result
                 Coordinate::Rotation { symbols, .. } => {
                     symbols.quaternion.contains(&symbol) || symbols.velocity.contains(&symbol)
                 }
-                Coordinate::Prescribed { .. } | Coordinate::Weld | Coordinate::Follower { .. } => false,
+                Coordinate::Prescribed { .. }
+                | Coordinate::Turned { .. }
+                | Coordinate::Weld
+                | Coordinate::Follower { .. } => false,
             });
             link.map(|link| study.joints[link.joint].span)
         };

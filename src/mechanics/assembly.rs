@@ -1,8 +1,8 @@
 //! Can the loops be closed, and which of their constraints say something new? Answered near every start of the study.
 
-use super::linkage::Linkage;
+use super::linkage::{Linkage, OtherPosition};
 use super::loops::{Direction, Row};
-use super::topology::{Coordinate, Tree};
+use super::topology::Tree;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::{Graph, Node, Symbol};
 use crate::study::{JointKind, Start, Study};
@@ -50,6 +50,7 @@ pub(super) fn assemble_loops(
     }
     let mut positions: Vec<HashMap<Symbol, f64>> = Vec::new();
     let mut known: Vec<(HashMap<Symbol, f64>, HashMap<Symbol, f64>)> = Vec::new();
+    let mut warnings = Vec::new();
     for start in &starts {
         let given = linkage.given(study, start);
         if let Some((_, closed)) = known.iter().find(|(before, _)| *before == given) {
@@ -57,17 +58,66 @@ pub(super) fn assemble_loops(
             continue;
         }
         let closed = linkage.assembled(&given).map_err(|residual| vec![not_closed(study, rows, &residual)])?;
+        if let Some(other) = linkage.other_position(&given, &closed)
+            && warnings.is_empty()
+        {
+            warnings.push(other_position(study, &other));
+        }
         known.push((given, closed.clone()));
         positions.push(closed);
     }
     let jacobian = linkage.general_jacobian(&positions[0]);
     let kept = independent_rows(&jacobian, rows);
     let freedom = linkage.freedom() - kept.len();
-    let is_driven = tree.links.iter().any(|link| matches!(link.coordinate, Coordinate::Prescribed { .. }));
+    let is_driven = study.joints.iter().flat_map(|joint| &joint.axes).any(|axis| axis.prescribed.is_some());
     if freedom == 0 && !is_driven {
         return Err(vec![cannot_move(study, rows)]);
     }
-    Ok(Assembly { warnings: redundancies(study, rows, &kept), kept, positions })
+    if is_driven
+        && kept.len() < rows.len()
+        && let Some(row) = linkage.contradicted(&positions[0], &kept)
+    {
+        return Err(vec![contradicted(study, &rows[row])]);
+    }
+    warnings.extend(redundancies(study, rows, &kept));
+    Ok(Assembly { warnings, kept, positions })
+}
+
+/// Prescribed motions that the loops do not allow.
+fn contradicted(study: &Study, row: &Row) -> Diagnostic {
+    let driven: Vec<&crate::study::Joint> =
+        study.joints.iter().filter(|joint| joint.axes.iter().any(|axis| axis.prescribed.is_some())).collect();
+    let names: Vec<String> = driven.iter().map(|joint| format!("`{}`", joint.name)).collect();
+    let held = &study.joints[row.joint];
+    let message =
+        format!("the prescribed motions of {} tear the loop apart at joint `{}`", names.join(", "), held.name);
+    let mut diagnostic = Diagnostic::error(Code::MOTIONS_CONTRADICT, message)
+        .label(held.span, format!("cannot keep on holding {}", row.holds));
+    for joint in driven.iter().filter(|joint| joint.name != held.name) {
+        diagnostic = diagnostic.secondary(joint.span, "its motion is prescribed");
+    }
+    diagnostic.help(
+        "the rest of the mechanism decides on a motion that is prescribed: prescribe as many as it has freedoms, or let the \
+         held direction go",
+    )
+}
+
+/// A loop that closes elsewhere, too.
+fn other_position(study: &Study, other: &OtherPosition) -> Diagnostic {
+    let of_joint =
+        |joint: &&crate::study::Joint| joint.axes.iter().any(|axis| axis.symbols.position == other.coordinate);
+    let joint = study.joints.iter().find(of_joint);
+    let path = study.graph.symbol_name(other.coordinate);
+    let value = |amount: f64| {
+        if other.is_turn { format!("{:.4} deg", amount.to_degrees()) } else { format!("{:.6} m", amount) }
+    };
+    let (chosen, alternative) = (value(other.chosen), value(other.alternative));
+    let name = joint.map_or(path, |joint| joint.name.as_str());
+    let message = format!("the loops can be assembled in several ways: joint `{name}` starts at {chosen}");
+    Diagnostic::warning(Code::SEVERAL_POSITIONS, message)
+        .label(joint.map_or_else(Default::default, |joint| joint.span), format!("could stand at {alternative}, too"))
+        .note("the drawn position is far from one that closes the loops, so that it does not tell which is meant")
+        .help(format!("say it in the start: `start = rest {{ {path} = {chosen} }}`"))
 }
 
 /// Gram-Schmidt over the rows, shifts before turns: a mechanism loses turning constraints first.
@@ -118,7 +168,8 @@ fn not_closed(study: &Study, rows: &[Row], residual: &[f64]) -> Diagnostic {
 fn cannot_move(study: &Study, rows: &[Row]) -> Diagnostic {
     let mut names: Vec<String> = rows.iter().map(|row| format!("`{}`", study.joints[row.joint].name)).collect();
     names.dedup();
-    let message = format!("the mechanism cannot move: {} take away all its freedom", names.join(", "));
+    let verb = if names.len() == 1 { "takes" } else { "take" };
+    let message = format!("the mechanism cannot move: {} {verb} away all its freedom", names.join(", "));
     let mut diagnostic = Diagnostic::error(Code::CANNOT_MOVE, message);
     let mut seen = Vec::new();
     for row in rows {

@@ -1,8 +1,8 @@
 //! The stage's one entry.
 
 use super::articulated::{self, Accelerated, Inertia, Wrench};
-use super::assemble::assemble;
-use super::closing::closing_coordinate;
+use super::assemble::{assemble, quaternion_rates};
+use super::closing::{closing_coordinate, closing_rotation};
 use super::elastic::refuse_large_modes;
 use super::events;
 use super::forces::{self, Effect, ForceGeometry};
@@ -16,7 +16,7 @@ use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::vector;
 use crate::expression::{Graph, Node, Symbol};
 use crate::study::{PointMotion, Study};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// The equations of motion of a study.
 ///
@@ -90,9 +90,11 @@ fn kinematic_meaning(
         let (symbols, given) = match link.coordinate {
             Coordinate::Free { symbols, .. } => (symbols, None),
             Coordinate::Prescribed { symbols, motion, .. } => (symbols, Some(motion)),
-            Coordinate::Rotation { .. } | Coordinate::Weld | Coordinate::Mode { .. } | Coordinate::Follower { .. } => {
-                continue;
-            }
+            Coordinate::Rotation { .. }
+            | Coordinate::Turned { .. }
+            | Coordinate::Weld
+            | Coordinate::Mode { .. }
+            | Coordinate::Follower { .. } => continue,
         };
         // Only the last link of a joint carries bodies.
         let Some(&last) = tree.links_of_joint[link.joint].last() else { continue };
@@ -114,6 +116,11 @@ fn kinematic_meaning(
                 meaning.insert(axis.symbols.position, geometry.coordinate);
                 meaning.insert(axis.symbols.velocity, geometry.rate);
             }
+        }
+        if let Some(symbols) = joint.rotation {
+            let (quaternion, velocity) = closing_rotation(graph, tree, frames, joint);
+            meaning.extend(symbols.quaternion.into_iter().zip(quaternion));
+            meaning.extend(symbols.velocity.into_iter().zip(velocity));
         }
     }
     for quantity in &study.point_quantities {
@@ -141,11 +148,77 @@ fn kinematic_meaning(
     ordered.into_iter().zip(nodes).collect()
 }
 
+/// Accelerations of closing joints' coordinates that measures ask for: their rates, derived along the motion.
+fn closing_accelerations(
+    graph: &mut Graph,
+    study: &Study,
+    tree: &Tree,
+    joint_accelerations: &[Node],
+    meaning: &mut HashMap<Symbol, Node>,
+) {
+    let outputs: Vec<Node> = study.outputs().map(|(_, value, _)| value).collect();
+    let asked: HashSet<Symbol> = graph.symbols_of(&outputs).into_iter().collect();
+    let closing = study.joints.iter().filter(|joint| joint.closes_loop);
+    let pairs = closing.flat_map(|joint| {
+        let axes = joint.axes.iter().map(|axis| (axis.symbols.velocity, axis.symbols.acceleration));
+        let turning =
+            joint.rotation.into_iter().flat_map(|symbols| symbols.velocity.into_iter().zip(symbols.acceleration));
+        axes.chain(turning)
+    });
+    let asked: Vec<(Node, Symbol)> = pairs
+        .filter(|(_, acceleration)| asked.contains(acceleration))
+        .filter_map(|(velocity, acceleration)| Some((*meaning.get(&velocity)?, acceleration)))
+        .collect();
+    if asked.is_empty() {
+        return;
+    }
+    let rates = motion_rates(graph, tree, joint_accelerations);
+    for (rate, acceleration) in asked {
+        let mut total = graph.differentiate(&[rate], study.time)[0];
+        for symbol in graph.symbols_of(&[rate]) {
+            let Some(&change) = rates.get(&symbol) else { continue };
+            let slope = graph.differentiate(&[rate], symbol)[0];
+            let share = graph.multiply(slope, change);
+            total = graph.add(total, share);
+        }
+        meaning.insert(acceleration, total);
+    }
+}
+
+/// Derivatives of positions and velocities along the motion.
+fn motion_rates(graph: &mut Graph, tree: &Tree, joint_accelerations: &[Node]) -> HashMap<Symbol, Node> {
+    let mut rates = HashMap::new();
+    for (link, &acceleration) in tree.links.iter().zip(joint_accelerations) {
+        match link.coordinate {
+            Coordinate::Free { symbols, .. } | Coordinate::Mode { symbols, .. } => {
+                rates.insert(symbols.position, graph.variable(symbols.velocity));
+                rates.insert(symbols.velocity, acceleration);
+            }
+            Coordinate::Rotation { symbols, component, .. } => {
+                if component == 0 {
+                    let velocity = symbols.velocity.map(|symbol| graph.variable(symbol));
+                    let changes = quaternion_rates(graph, symbols.quaternion, velocity);
+                    rates.extend(symbols.quaternion.into_iter().zip(changes));
+                }
+                rates.insert(symbols.velocity[component], acceleration);
+            }
+            Coordinate::Prescribed { .. }
+            | Coordinate::Turned { .. }
+            | Coordinate::Weld
+            | Coordinate::Follower { .. } => {}
+        }
+    }
+    rates
+}
+
 /// Symbols of accelerations, with the study's word for each.
 fn acceleration_symbols(study: &Study, tree: &Tree) -> Vec<(Symbol, String)> {
     let joints = tree.links.iter().filter_map(|link| link.free_symbols().map(|(_, acceleration)| acceleration));
     let closing = study.joints.iter().filter(|joint| joint.closes_loop);
-    let closing = closing.flat_map(|joint| joint.axes.iter().map(|axis| axis.symbols.acceleration));
+    let closing = closing.flat_map(|joint| {
+        let turning = joint.rotation.into_iter().flat_map(|symbols| symbols.acceleration);
+        joint.axes.iter().map(|axis| axis.symbols.acceleration).chain(turning)
+    });
     let points = study.point_quantities.iter().filter(|quantity| quantity.motion.is_acceleration());
     joints
         .chain(closing)
@@ -235,9 +308,10 @@ fn add_accelerations(
             Coordinate::Rotation { symbols, component, .. } => {
                 meaning.insert(symbols.acceleration[component], acceleration);
             }
-            Coordinate::Weld | Coordinate::Follower { .. } => {}
+            Coordinate::Turned { .. } | Coordinate::Weld | Coordinate::Follower { .. } => {}
         }
     }
+    closing_accelerations(graph, study, tree, &joint_accelerations, meaning);
     let quantities: Vec<_> = study.point_quantities.iter().filter(|q| q.motion.is_acceleration()).collect();
     if quantities.is_empty() {
         return;

@@ -2,7 +2,7 @@
 
 use super::topology::{Axis, Coordinate, Link, Seat, Tree};
 use crate::expression::vector::{self, Matrix, Vector};
-use crate::expression::{Binary, Graph, Node};
+use crate::expression::{Binary, Graph, Node, Symbol};
 
 /// Motion of one link's frame. Vectors are in the link's axes unless stated.
 #[derive(Clone, Debug)]
@@ -48,11 +48,12 @@ fn relative_placement(graph: &mut Graph, link: &Link) -> (Matrix, Vector) {
         Coordinate::Free { symbols, .. } => graph.variable(symbols.position),
         Coordinate::Prescribed { motion, .. } => motion[0],
         Coordinate::Follower { position, .. } => position,
-        Coordinate::Rotation { symbols, component: 0, axes } => {
-            let quaternion = symbols.quaternion.map(|symbol| graph.variable(symbol));
-            let about_axes = vector::rotation_of_quaternion(graph, quaternion);
-            let rotation = vector::multiply(graph, axes, about_axes);
-            return (vector::multiply(graph, rotation, vector::transpose(axes)), vector::zero(graph));
+        Coordinate::Rotation { symbols, component: 0, axes, is_reversed: false } => {
+            return (turned_by(graph, symbols.quaternion, axes), vector::zero(graph));
+        }
+        Coordinate::Turned { symbols, axes } => {
+            let forth = turned_by(graph, symbols.quaternion, axes);
+            return (vector::transpose(forth), vector::zero(graph));
         }
         Coordinate::Rotation { .. } | Coordinate::Weld | Coordinate::Mode { .. } => {
             return (vector::identity(graph), vector::zero(graph));
@@ -64,16 +65,27 @@ fn relative_placement(graph: &mut Graph, link: &Link) -> (Matrix, Vector) {
     }
 }
 
+/// Rotation by a quaternion about `axes`.
+fn turned_by(graph: &mut Graph, quaternion: [Symbol; 4], axes: Matrix) -> Matrix {
+    let quaternion = quaternion.map(|symbol| graph.variable(symbol));
+    let about_axes = vector::rotation_of_quaternion(graph, quaternion);
+    let rotation = vector::multiply(graph, axes, about_axes);
+    vector::multiply(graph, rotation, vector::transpose(axes))
+}
+
 /// The relative velocity (angular, linear) with which the bias of a link arises: its own, but for a free rotation, whose
 /// three components turn with the frame together, the first takes all and the others nothing.
 fn rate_in_bias(graph: &mut Graph, link: &Link) -> (Vector, Vector) {
     let zero = vector::zero(graph);
     match link.coordinate {
-        Coordinate::Rotation { symbols, component: 0, axes } => {
+        Coordinate::Rotation { symbols, component: 0, axes, is_reversed } => {
             let rates = symbols.velocity.map(|symbol| graph.variable(symbol));
-            (vector::apply(graph, axes, rates), zero)
+            let turning = vector::apply(graph, axes, rates);
+            (if is_reversed { vector::negate(graph, turning) } else { turning }, zero)
         }
-        Coordinate::Rotation { .. } | Coordinate::Weld | Coordinate::Mode { .. } => (zero, zero),
+        Coordinate::Rotation { .. } | Coordinate::Turned { .. } | Coordinate::Weld | Coordinate::Mode { .. } => {
+            (zero, zero)
+        }
         Coordinate::Free { .. } | Coordinate::Prescribed { .. } | Coordinate::Follower { .. } => {
             let rate = link.rate(graph);
             let (turning, shifting) = motion_axis(graph, link.axis);

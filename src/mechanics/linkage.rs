@@ -22,9 +22,30 @@ const ASIDE: f64 = 0.03;
 const ATTEMPTS: usize = 40;
 const FAR: f64 = 3.0;
 
+/// A loop that is closed further than this from the start (rad; m) may have been meant otherwise.
+const NEAR: f64 = 0.5;
+/// Positions whose coordinates differ by more than this (rad; m) are different ways to stand.
+const ELSEWHERE: f64 = 0.1;
+/// Tries to find another position, and the size of mechanism up to which it is tried.
+const TRIES: usize = 8;
+const MOST_FREEDOMS: usize = 40;
+/// Times at which prescribed motions are compared with the loops, s.
+const TIMES: [f64; 3] = [0.0, 0.05, 0.3];
+/// Velocities that the loops take up to this share are allowed by them.
+const ALLOWED: f64 = 1e-6;
+
+/// A coordinate that could have another value where the loops are closed.
+pub(super) struct OtherPosition {
+    pub coordinate: Symbol,
+    pub is_turn: bool,
+    pub chosen: f64,
+    pub alternative: f64,
+}
+
 /// The constraints as functions of the coordinates.
 pub(super) struct Linkage {
     graph: Graph,
+    time: Symbol,
     positions: Vec<Node>,
     velocities: Vec<Node>,
     upright: Vec<Node>,
@@ -40,6 +61,16 @@ struct Freedom {
     is_turn: bool,
     /// A modal coordinate: deformation closes a loop only where rigid motion cannot.
     is_elastic: bool,
+}
+
+impl Freedom {
+    /// The coordinate, where it is one of its own.
+    fn coordinate(&self) -> Option<Symbol> {
+        match self.change {
+            Change::Coordinate(symbol) => Some(symbol),
+            Change::Quaternion(..) => None,
+        }
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -81,11 +112,14 @@ impl Linkage {
                         values.insert(s, f64::from(u8::from(i == 0)));
                     });
                 }
-                Coordinate::Prescribed { .. } | Coordinate::Weld | Coordinate::Follower { .. } => {}
+                Coordinate::Prescribed { .. }
+                | Coordinate::Turned { .. }
+                | Coordinate::Weld
+                | Coordinate::Follower { .. } => {}
             }
         }
         let (positions, velocities, upright) = (positions.to_vec(), velocities.to_vec(), upright.to_vec());
-        Self { graph: small, positions, velocities, upright, freedoms, values }
+        Self { graph: small, time: study.time, positions, velocities, upright, freedoms, values }
     }
 
     pub fn freedom(&self) -> usize {
@@ -145,6 +179,100 @@ impl Linkage {
         let jacobian = self.jacobian();
         self.values = drawn;
         jacobian
+    }
+
+    /// Another way to close the loops with what is given, where the position chosen is far from the start.
+    pub fn other_position(
+        &mut self,
+        given: &HashMap<Symbol, f64>,
+        chosen: &HashMap<Symbol, f64>,
+    ) -> Option<OtherPosition> {
+        let unstated: Vec<usize> = (0..self.freedoms.len())
+            .filter(|&i| !self.freedoms[i].is_elastic && !self.freedoms[i].change.touches(given))
+            .collect();
+        let stated = |s: &Symbol| given.get(s).or(self.values.get(s)).copied().unwrap_or(0.0);
+        // Only where the given values leave no freedom do two positions mean two ways to stand.
+        let is_far = unstated.iter().any(|&i| {
+            self.freedoms[i]
+                .coordinate()
+                .is_some_and(|s| (chosen.get(&s).copied().unwrap_or(0.0) - stated(&s)).abs() > NEAR)
+        });
+        if !is_far || self.freedoms.len() > MOST_FREEDOMS || self.is_free(chosen, &unstated) {
+            return None;
+        }
+        let drawn = self.values.clone();
+        let mut found = None;
+        for attempt in 0..TRIES {
+            self.values = chosen.clone();
+            self.move_far(&unstated, attempt * ATTEMPTS / TRIES, 1.0);
+            if self.close(&unstated).is_ok() {
+                found = self.largest_difference(chosen, &unstated);
+            }
+            if found.is_some() {
+                break;
+            }
+        }
+        self.values = drawn;
+        found
+    }
+
+    /// Whether the loops leave the coordinates `moved` a motion.
+    fn is_free(&mut self, closed: &HashMap<Symbol, f64>, moved: &[usize]) -> bool {
+        let m = self.positions.len();
+        let all = self.general_jacobian(closed);
+        let jacobian: Vec<f64> = moved.iter().flat_map(|&i| &all[i * m..(i + 1) * m]).copied().collect();
+        SingularValueDecomposition::new(m, moved.len(), &jacobian).map_or(true, |svd| svd.rank(1e-7) < moved.len())
+    }
+
+    fn largest_difference(&self, chosen: &HashMap<Symbol, f64>, moved: &[usize]) -> Option<OtherPosition> {
+        let difference = |&i: &usize| {
+            let freedom = &self.freedoms[i];
+            let coordinate = freedom.coordinate()?;
+            let [chosen, found] = [chosen, &self.values].map(|values| values.get(&coordinate).copied().unwrap_or(0.0));
+            let turn = std::f64::consts::TAU;
+            let change = found - chosen;
+            let change = if freedom.is_turn { change - turn * (change / turn).round() } else { change };
+            let mut alternative = chosen + change;
+            if freedom.is_turn {
+                alternative -= turn * (alternative / turn).round();
+            }
+            let other = OtherPosition { coordinate, is_turn: freedom.is_turn, chosen, alternative };
+            (change.abs() > ELSEWHERE).then_some((change.abs(), other))
+        };
+        moved.iter().filter_map(difference).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, other)| other)
+    }
+
+    /// A row that is not kept and that prescribed motions violate, although all rows kept allow them.
+    pub fn contradicted(&mut self, closed: &HashMap<Symbol, f64>, kept: &[usize]) -> Option<usize> {
+        let drawn = std::mem::replace(&mut self.values, closed.clone());
+        let all: Vec<usize> = (0..self.freedoms.len()).collect();
+        let mut found = None;
+        for time in TIMES {
+            self.values = closed.clone();
+            self.values.insert(self.time, time);
+            if time > 0.0 && self.close(&all).is_err() {
+                continue;
+            }
+            // Inputs, whatever they are, change at some rate.
+            let value = |s: Symbol| {
+                let is_rate = self.freedoms.iter().any(|freedom| freedom.rate == s);
+                if is_rate { 0.0 } else { self.values.get(&s).copied().unwrap_or(0.0) }
+            };
+            let driven = self.graph.evaluate(&self.velocities, value, |_, order, _| if order == 1 { 1.0 } else { 0.0 });
+            let step = self.shortest_step(&driven, &all).unwrap_or_else(|| vec![0.0; all.len()]);
+            let (m, jacobian) = (driven.len(), self.jacobian());
+            let rest = |row: usize| {
+                let taken: f64 = step.iter().enumerate().map(|(i, s)| jacobian[i * m + row] * s).sum();
+                (driven[row] + taken).abs()
+            };
+            let size = driven.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
+            found = (0..m).filter(|row| !kept.contains(row)).find(|&row| rest(row) > ALLOWED * size);
+            if found.is_some() {
+                break;
+            }
+        }
+        self.values = drawn;
+        found
     }
 
     fn evaluate(&self, nodes: &[Node]) -> Vec<f64> {

@@ -4,65 +4,13 @@
 //! a multiplier acts on the bodies by exactly the transpose of that function.
 
 use super::articulated::Wrench;
+use super::chain::{Chain, Ends, FreeShift, unit};
 use super::kinematics::{self, FrameMotion};
 use super::topology::{Seat, Tree};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::expression::vector::{self, Matrix, Vector};
-use crate::expression::{Graph, Node};
-use crate::study::{AxisMotion, Joint, JointKind, Study};
-
-/// The two ends of a closing joint, in the order in which its shifts come before its turns: from parent to child, or, of a
-/// joint that turns first, from child to parent.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ends {
-    pub near: Seat,
-    pub far: Seat,
-    /// The joint's axes (the parent's, at the joint's coordinates zero) to the axes of the links of either end.
-    near_axes: Matrix,
-    far_axes: Matrix,
-    pub is_swapped: bool,
-}
-
-impl Ends {
-    pub fn new(graph: &mut Graph, tree: &Tree, joint: &Joint) -> Self {
-        let [parent, child] = [&joint.parent, &joint.child].map(|end| tree.place(graph, end));
-        let child_axes = match joint.orientation {
-            None => child.rotation,
-            Some(matrix) => vector::multiply(graph, child.rotation, vector::transpose(matrix)),
-        };
-        if joint.axes.is_empty() || leading_shifts(joint.axes.iter().map(|axis| axis.motion)) {
-            Ends { near: parent, far: child, near_axes: parent.rotation, far_axes: child_axes, is_swapped: false }
-        } else {
-            Ends { near: child, far: parent, near_axes: child_axes, far_axes: parent.rotation, is_swapped: true }
-        }
-    }
-
-    /// Vectors of the links of either end in ground axes.
-    pub fn in_ground(&self, graph: &mut Graph, frames: &[FrameMotion], [near, far]: [Vector; 2]) -> [Vector; 2] {
-        let [r_near, r_far] = [self.near, self.far].map(|end| kinematics::orientation(graph, frames, end.link));
-        [vector::apply(graph, r_near, near), vector::apply(graph, r_far, far)]
-    }
-
-    /// A direction given in the joint's axes as vectors fixed to the links of either end.
-    pub fn carried(&self, graph: &mut Graph, direction: [f64; 3]) -> [Vector; 2] {
-        let direction = vector::constant(graph, direction);
-        [self.near_axes, self.far_axes].map(|axes| vector::apply(graph, axes, direction))
-    }
-}
-
-impl Ends {
-    /// The distance along a direction of the near link, in the form of a constraint.
-    pub fn along(&self, direction: Vector) -> Row {
-        let geometry = Geometry::Carried(direction);
-        Row { joint: 0, holds: String::new(), direction: Direction::Distance, ends: *self, geometry }
-    }
-}
-
-/// Whether no shift comes behind a turn.
-fn leading_shifts(motions: impl Iterator<Item = AxisMotion>) -> bool {
-    let is_turn: Vec<bool> = motions.map(|motion| matches!(motion, AxisMotion::Turn(_))).collect();
-    is_turn.is_sorted()
-}
+use crate::expression::vector::{self, Vector};
+use crate::expression::{Graph, Node, Symbol};
+use crate::study::{Joint, JointKind, Study};
 
 /// One constraint `0 = g(q, t)`.
 #[derive(Clone, Debug)]
@@ -71,7 +19,7 @@ pub(super) struct Row {
     /// What it holds, in words.
     pub holds: String,
     pub direction: Direction,
-    ends: Ends,
+    ends: MovingEnds,
     geometry: Geometry,
 }
 
@@ -85,31 +33,67 @@ pub(super) enum Direction {
     Distance,
 }
 
+/// Points of the two ends, which prescribed motions move in their links, and the points where reactions are stated.
+#[derive(Clone, Copy, Debug)]
+struct MovingEnds {
+    near: Seat,
+    far: Seat,
+    /// Rates of the points against their links, link axes.
+    rates: [Vector; 2],
+    /// The child's attachment.
+    child: Seat,
+    is_swapped: bool,
+}
+
+/// A vector in the axes of a link, with its rate against them.
+#[derive(Clone, Copy, Debug)]
+struct Arrow {
+    now: Vector,
+    rate: Vector,
+}
+
+impl Arrow {
+    fn new(graph: &mut Graph, time: Symbol, now: Vector) -> Self {
+        let rate = graph.differentiate(&now, time);
+        Arrow { now, rate: [rate[0], rate[1], rate[2]] }
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 enum Geometry {
     /// A ground-fixed direction times the distance vector.
     Fixed(Vector),
-    /// A direction of the near link (link axes) times the distance vector.
-    Carried(Vector),
-    /// A direction of the near link times one of the far link, minus their product at the joint's coordinates zero.
-    Angle { near: Vector, far: Vector, drawn: f64 },
+    /// A direction of the near link times the distance vector.
+    Carried(Arrow),
+    /// The distance vector's part across a direction of the near link and one of the far link.
+    Across { near: Arrow, far: Arrow },
+    /// A direction of the near link times one of the far link, minus their product as meant (and its rate).
+    Angle { near: Arrow, far: Arrow, meant: [Node; 2] },
     /// Distance of the points, m.
     Distance(Node),
+}
+
+/// The distance along a direction of the near link, in the form of a constraint.
+pub(super) fn along(graph: &mut Graph, ends: &Ends, direction: Vector) -> Row {
+    let zero = vector::zero(graph);
+    let geometry = Geometry::Carried(Arrow { now: direction, rate: zero });
+    let ends = MovingEnds { near: ends.near, far: ends.far, rates: [zero; 2], child: ends.far, is_swapped: false };
+    Row { joint: 0, holds: String::new(), direction: Direction::Distance, ends, geometry }
 }
 
 /// Rows of all joints that close loops.
 ///
 /// # Errors
-/// Joints whose freedom cannot be written as constraints: shifts behind turns.
+/// Joints whose freedom cannot be written as constraints: shifts between turns.
 pub(super) fn rows(graph: &mut Graph, study: &Study, tree: &Tree) -> Result<Vec<Row>, Vec<Diagnostic>> {
     let mut rows = Vec::new();
     let mut errors = Vec::new();
     for (index, joint) in study.joints.iter().enumerate().filter(|(_, joint)| joint.closes_loop) {
-        let ends = Ends::new(graph, tree, joint);
-        if let Some(axis) = joint.axes.iter().find(|axis| axis.prescribed.is_some()) {
-            errors.push(prescribed_in_loop(joint, &axis.name));
+        let Some(chain) = Chain::new(graph, tree, joint) else {
+            errors.push(no_constraint_form(joint));
             continue;
-        }
+        };
+        let ends = moving_ends(graph, study.time, &chain);
         let mut add = |(direction, geometry): (Direction, Geometry)| {
             rows.push(Row { joint: index, holds: holds(direction), direction, ends, geometry });
         };
@@ -117,12 +101,19 @@ pub(super) fn rows(graph: &mut Graph, study: &Study, tree: &Tree) -> Result<Vec<
             add((Direction::Distance, Geometry::Distance(length)));
             continue;
         }
-        match position_rows(graph, joint, &ends) {
-            Some(positions) => positions.into_iter().chain(angle_rows(graph, joint, &ends)).for_each(add),
-            None => errors.push(no_constraint_form(joint)),
+        position_rows(graph, study.time, &chain).into_iter().for_each(&mut add);
+        if joint.rotation.is_none() {
+            angle_rows(graph, study.time, &chain).into_iter().for_each(add);
         }
     }
     if errors.is_empty() { Ok(rows) } else { Err(errors) }
+}
+
+fn moving_ends(graph: &mut Graph, time: Symbol, chain: &Chain) -> MovingEnds {
+    let Ends { near, far, .. } = chain.ends;
+    let rates = [near, far].map(|end| Arrow::new(graph, time, end.offset).rate);
+    let child = if chain.is_swapped { chain.attached.near } else { chain.attached.far };
+    MovingEnds { near, far, rates, child, is_swapped: chain.is_swapped }
 }
 
 fn holds(direction: Direction) -> String {
@@ -141,104 +132,92 @@ fn without_sign(axis: [f64; 3]) -> [f64; 3] {
 
 fn no_constraint_form(joint: &Joint) -> Diagnostic {
     Diagnostic::error(Code::CLOSED_LOOP, format!("joint `{}` cannot close its loop", joint.name))
-        .label(joint.span, "it shifts on both sides of a turn")
-        .help("list its shifts first, `axes(shift y, shift x, turn z)`, or its turns; or let it have one shift only")
+        .label(joint.span, "it shifts between two turns")
+        .help("list its shifts first, `axes(shift y, shift x, turn z)`, or its turns")
 }
 
-fn prescribed_in_loop(joint: &Joint, axis: &str) -> Diagnostic {
-    Diagnostic::error(
-        Code::CLOSED_LOOP,
-        format!("the motion of `{axis}` is prescribed, but joint `{}` closes a loop", joint.name),
-    )
-    .label(joint.span, "closes the loop")
-    .help(
-        "declare it before the joint of the same loop that has as much freedom; the last one declared closes the loop",
-    )
-}
-
-/// Directions that the shifts leave held. `None`: shifts on both sides of a turn.
-fn position_rows(graph: &mut Graph, joint: &Joint, ends: &Ends) -> Option<Vec<(Direction, Geometry)>> {
-    let motions = || joint.axes.iter().map(|axis| axis.motion);
-    if !leading_shifts(motions()) && !leading_shifts(motions().rev()) {
-        return None;
-    }
-    let shifts: Vec<[f64; 3]> =
-        motions().filter(|motion| matches!(motion, AxisMotion::Shift(_))).map(AxisMotion::direction).collect();
-    let held: Vec<[f64; 3]> = match shifts.as_slice() {
-        [] => {
-            return Some((0..3).map(|i| fixed(graph, i)).collect());
-        }
-        [axis] => vector::perpendicular(*axis).to_vec(),
-        [a, b] => vec![normal(*a, *b)],
-        _ => vec![],
+/// Directions that the shifts leave held.
+fn position_rows(graph: &mut Graph, time: Symbol, chain: &Chain) -> Vec<(Direction, Geometry)> {
+    let in_link = |graph: &mut Graph, shift: &FreeShift, direction: [f64; 3]| {
+        let direction = vector::constant(graph, direction);
+        vector::apply(graph, shift.axes, direction)
     };
-    let rows = held.into_iter().map(|direction| {
-        let [near, _] = ends.carried(graph, direction);
-        (Direction::Shift(direction), Geometry::Carried(near))
-    });
-    Some(rows.collect())
+    let carried = |graph: &mut Graph, shift: &FreeShift, held: [f64; 3]| {
+        let now = in_link(graph, shift, held);
+        (Direction::Shift(held), Geometry::Carried(Arrow::new(graph, time, now)))
+    };
+    match (chain.leading.as_slice(), chain.trailing.as_slice()) {
+        ([], []) => (0..3).map(|i| fixed(graph, i)).collect(),
+        ([shift], []) => vector::perpendicular(shift.direction).map(|held| carried(graph, shift, held)).to_vec(),
+        ([a, b], []) if a.axes == b.axes => vec![carried(graph, a, normal(a.direction, b.direction))],
+        ([a, b], []) => {
+            let [first, second] = [a, b].map(|shift| in_link(graph, shift, shift.direction));
+            let now = vector::cross(graph, first, second);
+            let held = normal(a.direction, b.direction);
+            vec![(Direction::Shift(held), Geometry::Carried(Arrow::new(graph, time, now)))]
+        }
+        ([a], [b]) => {
+            let [near, far] = [a, b].map(|shift| {
+                let now = in_link(graph, shift, shift.direction);
+                Arrow::new(graph, time, now)
+            });
+            vec![(Direction::Shift(normal(a.direction, b.direction)), Geometry::Across { near, far })]
+        }
+        _ => vec![],
+    }
 }
 
 fn fixed(graph: &mut Graph, index: usize) -> (Direction, Geometry) {
-    let axis: [f64; 3] = std::array::from_fn(|i| if i == index { 1.0 } else { 0.0 });
-    (Direction::Shift(axis), Geometry::Fixed(vector::constant(graph, axis)))
+    (Direction::Shift(unit(index)), Geometry::Fixed(vector::constant(graph, unit(index))))
 }
 
+/// Perpendicular to both; of parallel directions any perpendicular one.
 fn normal(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     let product: [f64; 3] = std::array::from_fn(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
     let length = product.iter().map(|x| x * x).sum::<f64>().sqrt();
-    product.map(|x| x / length)
+    if length > 0.0 { product.map(|x| x / length) } else { vector::perpendicular(a)[0] }
 }
 
-/// Pairs of directions that keep the angle between them.
-fn angle_rows(graph: &mut Graph, joint: &Joint, ends: &Ends) -> Vec<(Direction, Geometry)> {
-    if joint.rotation.is_some() {
-        return vec![];
-    }
-    let mut turns = turns(joint);
-    if ends.is_swapped {
-        turns.reverse();
-    }
+/// Pairs of directions that keep the angle between them, or have it prescribed.
+fn angle_rows(graph: &mut Graph, time: Symbol, chain: &Chain) -> Vec<(Direction, Geometry)> {
     // Each pair: direction of the near end, direction of the far end.
-    let pairs: Vec<([f64; 3], [f64; 3])> = match turns.as_slice() {
+    let pairs: Vec<([f64; 3], [f64; 3])> = match chain.turns.as_slice() {
         [] => (0..3).map(|i| (unit(i), unit((i + 1) % 3))).collect(),
         [axis] => vector::perpendicular(*axis).map(|across| (across, *axis)).to_vec(),
         [first, second] => vec![(*first, *second)],
         _ => vec![],
     };
     let rows = pairs.into_iter().map(|(of_near, of_far)| {
-        let [near, _] = ends.carried(graph, of_near);
-        let [_, far] = ends.carried(graph, of_far);
-        let drawn: f64 = of_near.iter().zip(of_far).map(|(a, b)| a * b).sum();
-        let drawn = if drawn.abs() < f64::EPSILON { 0.0 } else { drawn };
-        (Direction::Turn(normal(of_near, of_far)), Geometry::Angle { near, far, drawn })
+        let [near, _] = chain.ends.carried(graph, of_near);
+        let [_, far] = chain.ends.carried(graph, of_far);
+        let [near, far] = [near, far].map(|now| Arrow::new(graph, time, now));
+        let meant = match chain.between {
+            None => {
+                let drawn: f64 = of_near.iter().zip(of_far).map(|(a, b)| a * b).sum();
+                graph.constant(if drawn.abs() < f64::EPSILON { 0.0 } else { drawn })
+            }
+            Some(turn) => {
+                let [a, b] = [of_near, of_far].map(|direction| vector::constant(graph, direction));
+                let turned = vector::apply(graph, turn, b);
+                vector::dot(graph, a, turned)
+            }
+        };
+        let rate = graph.differentiate(&[meant], time)[0];
+        (Direction::Turn(normal(of_near, of_far)), Geometry::Angle { near, far, meant: [meant, rate] })
     });
     rows.collect()
-}
-
-fn turns(joint: &Joint) -> Vec<[f64; 3]> {
-    let is_turn = |motion: &AxisMotion| matches!(motion, AxisMotion::Turn(_));
-    joint.axes.iter().map(|axis| axis.motion).filter(is_turn).map(AxisMotion::direction).collect()
-}
-
-fn unit(index: usize) -> [f64; 3] {
-    std::array::from_fn(|k| if k == index { 1.0 } else { 0.0 })
 }
 
 /// Cosines that are one where a joint is closed as meant and not turned over: rows of angles hold in both positions.
 pub(super) fn upright(graph: &mut Graph, study: &Study, tree: &Tree, frames: &[FrameMotion]) -> Vec<Node> {
     let mut cosines = Vec::new();
     for joint in study.joints.iter().filter(|joint| joint.closes_loop && joint.rotation.is_none()) {
-        let ends = Ends::new(graph, tree, joint);
-        let kept: Vec<[f64; 3]> = match (joint.kind, turns(joint).as_slice()) {
-            (JointKind::Distance, _) => vec![],
-            (_, []) => (0..3).map(unit).collect(),
-            (_, [axis]) => vec![*axis],
-            _ => vec![],
+        let Some(chain) = Chain::new(graph, tree, joint).filter(|_| joint.kind != JointKind::Distance) else {
+            continue;
         };
-        for direction in kept {
-            let directions = ends.carried(graph, direction);
-            let [near, far] = ends.in_ground(graph, frames, directions);
+        for direction in chain.parallel() {
+            let directions = chain.ends.carried(graph, direction);
+            let [near, far] = chain.ends.in_ground(graph, frames, directions);
             cosines.push(vector::dot(graph, near, far));
         }
     }
@@ -256,7 +235,12 @@ impl Row {
     fn moving(&self, graph: &mut Graph, frames: &[FrameMotion]) -> Moving {
         let ends = [self.ends.near, self.ends.far];
         let [p, c] = ends.map(|end| kinematics::point_position(graph, frames, end));
-        let [v_p, v_c] = ends.map(|end| kinematics::point_velocity(graph, frames, end));
+        let [v_p, v_c] = [0, 1].map(|i| {
+            let carried = kinematics::point_velocity(graph, frames, ends[i]);
+            let orientation = kinematics::orientation(graph, frames, ends[i].link);
+            let own = vector::apply(graph, orientation, self.ends.rates[i]);
+            vector::add(graph, carried, own)
+        });
         let turning = ends.map(|end| kinematics::angular_velocity(graph, frames, end.link));
         Moving {
             distance: vector::subtract(graph, c, p),
@@ -265,26 +249,41 @@ impl Row {
         }
     }
 
-    /// Directions of the near and the far link in ground axes.
-    fn directions(&self, graph: &mut Graph, frames: &[FrameMotion]) -> [Vector; 2] {
+    /// Vectors of the near and the far link in ground axes.
+    fn in_ground(&self, graph: &mut Graph, frames: &[FrameMotion], vectors: [Vector; 2]) -> [Vector; 2] {
+        let links = [self.ends.near.link, self.ends.far.link];
+        [0, 1].map(|i| {
+            let orientation = kinematics::orientation(graph, frames, links[i]);
+            vector::apply(graph, orientation, vectors[i])
+        })
+    }
+
+    /// Directions of the near and the far link in ground axes, and their rates against the links.
+    fn directions(&self, graph: &mut Graph, frames: &[FrameMotion]) -> [[Vector; 2]; 2] {
+        let zero = vector::zero(graph);
         match self.geometry {
-            Geometry::Fixed(u) => [u, u],
-            Geometry::Carried(u) => self.ends.in_ground(graph, frames, [u, u]),
-            Geometry::Angle { near, far, .. } => self.ends.in_ground(graph, frames, [near, far]),
-            Geometry::Distance(_) => [vector::zero(graph); 2],
+            Geometry::Fixed(u) => [[u, u], [zero; 2]],
+            Geometry::Carried(u) => [u.now, u.rate].map(|v| self.in_ground(graph, frames, [v, zero])),
+            Geometry::Angle { near, far, .. } | Geometry::Across { near, far } => {
+                [[near.now, far.now], [near.rate, far.rate]].map(|pair| self.in_ground(graph, frames, pair))
+            }
+            Geometry::Distance(_) => [[zero; 2]; 2],
         }
     }
 
     /// g.
     pub fn position(&self, graph: &mut Graph, frames: &[FrameMotion]) -> Node {
         let moving = self.moving(graph, frames);
-        let [u, w] = self.directions(graph, frames);
+        let [[u, w], _] = self.directions(graph, frames);
         match self.geometry {
             Geometry::Fixed(_) | Geometry::Carried(_) => vector::dot(graph, u, moving.distance),
-            Geometry::Angle { drawn, .. } => {
+            Geometry::Across { .. } => {
+                let across = vector::cross(graph, u, w);
+                vector::dot(graph, across, moving.distance)
+            }
+            Geometry::Angle { meant, .. } => {
                 let now = vector::dot(graph, u, w);
-                let drawn = graph.constant(drawn);
-                graph.subtract(now, drawn)
+                graph.subtract(now, meant[0])
             }
             Geometry::Distance(length) => {
                 let square = vector::dot(graph, moving.distance, moving.distance);
@@ -300,18 +299,40 @@ impl Row {
     /// dg/dt.
     pub fn velocity(&self, graph: &mut Graph, frames: &[FrameMotion]) -> Node {
         let moving = self.moving(graph, frames);
-        let [u, w] = self.directions(graph, frames);
+        let [[u, w], [u_rate, w_rate]] = self.directions(graph, frames);
         match self.geometry {
             Geometry::Fixed(_) => vector::dot(graph, u, moving.relative_velocity),
             Geometry::Carried(_) => {
                 let swept = vector::cross(graph, moving.turning[0], moving.distance);
                 let relative = vector::subtract(graph, moving.relative_velocity, swept);
-                vector::dot(graph, u, relative)
+                let along = vector::dot(graph, u, relative);
+                let prescribed = vector::dot(graph, u_rate, moving.distance);
+                graph.add(along, prescribed)
             }
-            Geometry::Angle { .. } => {
+            Geometry::Across { .. } => {
+                let across = vector::cross(graph, u, w);
+                let mut rate = vector::dot(graph, across, moving.relative_velocity);
+                let [near, far] = moments_across(graph, [u, w], moving.distance);
+                let changes = [[u_rate, w], [u, w_rate]].map(|[a, b]| vector::cross(graph, a, b));
+                for [a, b] in [
+                    [near, moving.turning[0]],
+                    [far, moving.turning[1]],
+                    [changes[0], moving.distance],
+                    [changes[1], moving.distance],
+                ] {
+                    let share = vector::dot(graph, a, b);
+                    rate = graph.add(rate, share);
+                }
+                rate
+            }
+            Geometry::Angle { meant, .. } => {
                 let relative = vector::subtract(graph, moving.turning[1], moving.turning[0]);
                 let about = vector::cross(graph, w, u);
-                vector::dot(graph, relative, about)
+                let rate = vector::dot(graph, relative, about);
+                let [near, far] = [[u_rate, w], [u, w_rate]].map(|[a, b]| vector::dot(graph, a, b));
+                let prescribed = graph.add(near, far);
+                let prescribed = graph.subtract(prescribed, meant[1]);
+                graph.add(rate, prescribed)
             }
             Geometry::Distance(length) => {
                 let rate = vector::dot(graph, moving.distance, moving.relative_velocity);
@@ -320,38 +341,43 @@ impl Row {
         }
     }
 
-    /// What multiplier 1 does: force and moment on the far body at its attachment (ground axes), and its opposite on the near
-    /// one.
-    fn load(&self, graph: &mut Graph, frames: &[FrameMotion]) -> (Vector, Vector) {
+    /// What multiplier 1 does: force and moment on the far body at its end (ground axes), and the moment on the near one at
+    /// its own, where the opposite force acts.
+    fn load(&self, graph: &mut Graph, frames: &[FrameMotion]) -> (Vector, [Vector; 2]) {
         let zero = vector::zero(graph);
-        let [u, w] = self.directions(graph, frames);
+        let [[u, w], _] = self.directions(graph, frames);
         match self.geometry {
-            Geometry::Fixed(_) | Geometry::Carried(_) => (u, zero),
-            Geometry::Angle { .. } => (zero, vector::cross(graph, w, u)),
+            Geometry::Fixed(_) => (u, [zero; 2]),
+            Geometry::Carried(_) => {
+                // The near body is touched where the far one's end is.
+                let distance = self.moving(graph, frames).distance;
+                (u, [vector::cross(graph, u, distance), zero])
+            }
+            Geometry::Across { .. } => {
+                let distance = self.moving(graph, frames).distance;
+                (vector::cross(graph, u, w), moments_across(graph, [u, w], distance))
+            }
+            Geometry::Angle { .. } => {
+                let moment = vector::cross(graph, w, u);
+                (zero, [vector::negate(graph, moment), moment])
+            }
             Geometry::Distance(length) => {
                 let distance = self.moving(graph, frames).distance;
                 let one = graph.constant(1.0);
                 let inverse = graph.divide(one, length);
-                (vector::scale(graph, inverse, distance), zero)
+                (vector::scale(graph, inverse, distance), [zero; 2])
             }
         }
     }
 
     /// Wrenches of `multiplier` on the links.
     pub fn wrenches(&self, graph: &mut Graph, frames: &[FrameMotion], multiplier: Node) -> Vec<(usize, Wrench)> {
-        let (force, moment) = self.load(graph, frames);
+        let (force, moments) = self.load(graph, frames);
         let force = vector::scale(graph, multiplier, force);
-        let moment = vector::scale(graph, multiplier, moment);
-        let mut near = self.ends.near;
-        if let (Geometry::Carried(_), Some(link)) = (self.geometry, near.link) {
-            // The point of the near body that the far one's attachment touches.
-            let distance = self.moving(graph, frames).distance;
-            let arm = vector::apply_transposed(graph, frames[link].orientation, distance);
-            near.offset = vector::add(graph, near.offset, arm);
-        }
-        let reversed = (vector::negate(graph, force), vector::negate(graph, moment));
+        let moments = moments.map(|moment| vector::scale(graph, multiplier, moment));
+        let reversed = vector::negate(graph, force);
         let mut wrenches = Vec::new();
-        for (end, (force, moment)) in [(near, reversed), (self.ends.far, (force, moment))] {
+        for (end, force, moment) in [(self.ends.near, reversed, moments[0]), (self.ends.far, force, moments[1])] {
             let Some(link) = end.link else { continue };
             let orientation = frames[link].orientation;
             let force = vector::apply_transposed(graph, orientation, force);
@@ -364,17 +390,22 @@ impl Row {
 
     /// Force or moment on the child per multiplier 1, at its attachment, ground axes.
     pub fn reaction(&self, graph: &mut Graph, frames: &[FrameMotion], is_moment: bool) -> Vector {
-        let (force, moment) = self.load(graph, frames);
-        if !self.ends.is_swapped {
-            return if is_moment { moment } else { force };
+        let (force, [_, moment]) = self.load(graph, frames);
+        let mut on_far = force;
+        if is_moment {
+            let [end, child] =
+                [self.ends.far, self.ends.child].map(|end| kinematics::point_position(graph, frames, end));
+            let arm = vector::subtract(graph, end, child);
+            let by_force = vector::cross(graph, arm, force);
+            on_far = vector::add(graph, moment, by_force);
         }
-        // The far body is the parent; the force acts at its attachment.
-        if !is_moment {
-            return vector::negate(graph, force);
-        }
-        let distance = self.moving(graph, frames).distance;
-        let by_force = vector::cross(graph, distance, force);
-        let sum = vector::add(graph, moment, by_force);
-        vector::negate(graph, sum)
+        if self.ends.is_swapped { vector::negate(graph, on_far) } else { on_far }
     }
+}
+
+/// Moments of a unit load across `near` and `far` on the bodies that carry these directions.
+fn moments_across(graph: &mut Graph, [near, far]: [Vector; 2], distance: Vector) -> [Vector; 2] {
+    let of_near = vector::cross(graph, far, distance);
+    let of_far = vector::cross(graph, distance, near);
+    [vector::cross(graph, near, of_near), vector::cross(graph, far, of_far)]
 }

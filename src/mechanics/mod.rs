@@ -12,6 +12,7 @@
 mod articulated;
 mod assemble;
 mod assembly;
+mod chain;
 mod closing;
 mod derive;
 mod elastic;

@@ -7,7 +7,7 @@ use super::multipliers::Loops;
 use super::topology::{Seat, Tree};
 use crate::expression::vector::{self, Vector};
 use crate::expression::{Graph, Node, Symbol};
-use crate::study::{AxisMotion, ForcePlace, ReactionQuantity, Study};
+use crate::study::{ForcePlace, ReactionQuantity, Study};
 use std::collections::HashMap;
 
 /// Meaning of what joints transmit. Where loads depend on it (friction by a normal force) it becomes an unknown of its own:
@@ -25,7 +25,7 @@ pub(super) fn add_reactions(
     let mut unknowns = Vec::new();
     for reaction in &study.reactions {
         let vector = if study.joints[reaction.joint].closes_loop {
-            closing_reaction(graph, study, frames, reaction, (geometries, loads), loops)
+            closing_reaction(graph, study, (tree, frames), reaction, (geometries, loads), loops)
         } else {
             carried_reaction(graph, study, tree, frames, accelerated, reaction)
         };
@@ -72,7 +72,7 @@ fn carried_reaction(
 fn closing_reaction(
     graph: &mut Graph,
     study: &Study,
-    frames: &[FrameMotion],
+    (tree, frames): (&Tree, &[FrameMotion]),
     reaction: &ReactionQuantity,
     (geometries, loads): (&[ForceGeometry], &[Node]),
     loops: &Loops,
@@ -85,23 +85,29 @@ fn closing_reaction(
         sum = vector::add(graph, sum, share);
     }
     // Elements on the joint's own axes belong to what it transmits.
-    let ends = [study.joints[reaction.joint].parent.body, study.joints[reaction.joint].child.body];
+    let places = [&study.joints[reaction.joint].parent, &study.joints[reaction.joint].child];
+    let [parent, child] = places.map(|end| tree.place(graph, end));
     for ((force, geometry), &load) in study.forces.iter().zip(geometries).zip(loads) {
-        let ForcePlace::Joint { joint, axis } = force.place else { continue };
+        let ForcePlace::Joint { joint, .. } = force.place else { continue };
         let (Effect::Links(wrenches), true) = (&geometry.effect, joint == reaction.joint) else { continue };
-        let is_turn = matches!(study.joints[joint].axes[axis].motion, AxisMotion::Turn(_));
-        if is_turn != reaction.is_moment {
-            continue;
-        }
         // On the child; where that is ground, the opposite of what acts on the parent.
-        let (own, factor) = match ends {
-            [_, Some(_)] => (wrenches.last(), load),
-            _ => (wrenches.first(), graph.negate(load)),
+        let (body, factor) = match child.link {
+            Some(_) => (child.link, load),
+            None => (parent.link, graph.negate(load)),
         };
-        if let Some((link, wrench)) = own {
-            let local = if reaction.is_moment { wrench.moment } else { wrench.force };
-            let turned = vector::apply(graph, frames[*link].orientation, local);
-            let share = vector::scale(graph, factor, turned);
+        for (link, wrench) in wrenches.iter().filter(|(link, _)| Some(*link) == body) {
+            let orientation = frames[*link].orientation;
+            let acting = vector::apply(graph, orientation, wrench.force);
+            let mut share = acting;
+            if reaction.is_moment {
+                let origin = Seat { link: Some(*link), offset: vector::zero(graph), rotation: vector::identity(graph) };
+                let [origin, at] = [origin, child].map(|place| kinematics::point_position(graph, frames, place));
+                let arm = vector::subtract(graph, origin, at);
+                let about = vector::apply(graph, orientation, wrench.moment);
+                let by_force = vector::cross(graph, arm, acting);
+                share = vector::add(graph, about, by_force);
+            }
+            let share = vector::scale(graph, factor, share);
             sum = vector::add(graph, sum, share);
         }
     }

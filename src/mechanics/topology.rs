@@ -37,9 +37,12 @@ pub(super) enum Coordinate {
     Free { symbols: JointSymbols, at: usize },
     /// Position, velocity, acceleration are given.
     Prescribed { symbols: JointSymbols, at: usize, motion: [Node; 3] },
-    /// One of the three components of a free rotation, along the axes (columns of `axes`, in the frame) of the body that it
-    /// carries. The first carries the whole rotation of the frame.
-    Rotation { symbols: RotationSymbols, component: usize, axes: Matrix },
+    /// One of the three components of a free rotation, along the axes (columns of `axes`) of the joint's child. Walked from
+    /// parent to child they are fixed in the frame, and the first carries the whole rotation; walked from child to parent they
+    /// are fixed in the predecessor, and the rotation follows behind the last.
+    Rotation { symbols: RotationSymbols, component: usize, axes: Matrix, is_reversed: bool },
+    /// The turned frame behind the components of a reversed free rotation; no motion of its own.
+    Turned { symbols: RotationSymbols, axes: Matrix },
     /// No motion; only there because what it transmits is asked for.
     Weld,
     /// The coordinate of a mode of an elastic body. The frame does not move by it; frames of the body follow.
@@ -58,7 +61,10 @@ impl Link {
             Coordinate::Rotation { symbols, component, .. } => {
                 Some((symbols.velocity[component], symbols.acceleration[component]))
             }
-            Coordinate::Prescribed { .. } | Coordinate::Weld | Coordinate::Follower { .. } => None,
+            Coordinate::Prescribed { .. }
+            | Coordinate::Turned { .. }
+            | Coordinate::Weld
+            | Coordinate::Follower { .. } => None,
         }
     }
 
@@ -69,7 +75,7 @@ impl Link {
             Coordinate::Follower { velocity, .. } => velocity,
             Coordinate::Rotation { symbols, component, .. } => graph.variable(symbols.velocity[component]),
             Coordinate::Prescribed { motion, .. } => motion[1],
-            Coordinate::Weld => graph.constant(0.0),
+            Coordinate::Turned { .. } | Coordinate::Weld => graph.constant(0.0),
         }
     }
 }
@@ -266,7 +272,8 @@ impl Tree {
         let (parent_rotation, rotation) = rotations(graph, joint, is_reversed, place.rotation);
         let mut frame = place.link;
         let mut offset = place.offset;
-        let mut motions = motions(graph, study, joint, is_reversed, (parent_rotation, rotation));
+        let child_rotation = if is_reversed { place.rotation } else { rotation };
+        let mut motions = motions(graph, study, joint, is_reversed, (parent_rotation, child_rotation));
         if motions.is_empty() && is_asked {
             motions.push((Axis::Turn(vector::zero(graph)), Coordinate::Weld));
         }
@@ -299,7 +306,7 @@ fn motions(
     study: &Study,
     joint: &Joint,
     is_reversed: bool,
-    (parent_rotation, outer_rotation): (Matrix, Matrix),
+    (parent_rotation, child_rotation): (Matrix, Matrix),
 ) -> Vec<(Axis, Coordinate)> {
     let mut result = Vec::new();
     for (at, axis) in joint.axes.iter().enumerate() {
@@ -327,15 +334,19 @@ fn motions(
         result.reverse();
     }
     if let Some(symbols) = joint.rotation {
-        let components = (0..3).map(|component| {
-            let axis = outer_rotation.map(|row| row[component]);
-            (Axis::Turn(axis), Coordinate::Rotation { symbols, component, axes: outer_rotation })
-        });
-        let components: Vec<_> = components.collect();
+        let axes = child_rotation;
+        let component = |component: usize| {
+            let axis = axes.map(|row| row[component]);
+            (axis, Coordinate::Rotation { symbols, component, axes, is_reversed })
+        };
+        let components = (0..3).map(component);
         if is_reversed {
-            result.splice(0..0, components);
+            let mut turning: Vec<_> =
+                components.map(|(axis, own)| (Axis::Turn(vector::negate(graph, axis)), own)).collect();
+            turning.push((Axis::Turn(vector::zero(graph)), Coordinate::Turned { symbols, axes }));
+            result.splice(0..0, turning);
         } else {
-            result.extend(components);
+            result.extend(components.map(|(axis, own)| (Axis::Turn(axis), own)));
         }
     }
     result

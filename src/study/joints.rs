@@ -34,10 +34,11 @@ impl JointFreedom {
     }
 
     /// Such a joint cannot be written as constraints on directions of its two bodies.
-    pub fn shifts_around_a_turn(&self) -> bool {
-        let is_turn: Vec<bool> = self.axes.iter().map(|axis| matches!(axis.motion, AxisMotion::Turn(_))).collect();
-        let is_sorted_back = is_turn.iter().rev().is_sorted();
-        !is_turn.is_sorted() && !is_sorted_back
+    pub fn shifts_between_turns(&self) -> bool {
+        let is_turn = |axis: &AxisEntry| matches!(axis.motion, AxisMotion::Turn(_));
+        let first = self.axes.iter().position(is_turn);
+        let last = self.axes.iter().rposition(is_turn);
+        first.zip(last).is_some_and(|(first, last)| !self.axes[first..=last].iter().all(is_turn))
     }
 
     pub fn degrees_of_freedom(&self) -> usize {

@@ -215,7 +215,7 @@ impl<'a> Checker<'a> {
                 // A free joint holds nothing: it is there to give its body coordinates.
                 let is_free = read.freedom.kind == JointKind::Free;
                 let order = (!is_free, read.freedom.degrees_of_freedom());
-                (!is_driven, !read.freedom.shifts_around_a_turn(), !carries_elements(read), order)
+                (!is_driven, !read.freedom.shifts_between_turns(), !carries_elements(read), order)
             })
         });
         let mut closes_loop: Vec<bool> = self.topology.joints.iter().map(Option::is_some).collect();

@@ -8,6 +8,7 @@ mod faults;
 mod maximal;
 mod newton_euler;
 mod pendulum;
+mod random_states;
 mod run;
 mod spatial;
 mod text;

@@ -1,36 +1,41 @@
 //! Mechanisms of every kind of joint, with and without loops, against Newton and Euler in absolute coordinates: at every sample of
-//! a motion the bodies' accelerations balance gravity, elements and reactions, reactions do no work on the freedom of their
-//! joints, positions satisfy the joints' definitions, and accelerations are the derivatives of velocities. Together these
+//! a motion the bodies' accelerations balance gravity, elements and reactions, reactions do on the freedom of their joints what
+//! elements there do, the joints' coordinates put the child where it is, prescribed ones are what they shall be, and accelerations
+//! are the derivatives of velocities. Together these
 //! determine the motion and all reactions; nothing of the product's formalism is used.
 
 use crate::run::{Channels, checked, run};
 use ident::expression::Node;
 use ident::study::{Attachment, AxisMotion, Body, ForcePlace, Joint, JointKind, Study};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
-type V = Vector3<f64>;
-type M = Matrix3<f64>;
+pub type V = Vector3<f64>;
+pub type M = Matrix3<f64>;
 
 /// Motion of a body at one sample, ground axes.
-struct Motion {
-    axes: M,
-    origin: V,
-    centre: V,
+pub struct Motion {
+    pub axes: M,
+    pub origin: V,
+    pub origin_velocity: V,
+    pub origin_acceleration: V,
+    pub centre: V,
     velocity: V,
     acceleration: V,
-    spin: V,
-    spin_rate: V,
+    pub spin: V,
+    pub spin_rate: V,
 }
 
-struct Mechanism {
-    study: Study,
-    channels: Channels,
+pub struct Mechanism {
+    pub study: Study,
+    pub channels: Channels,
+    /// Of the samples.
+    pub times: Vec<f64>,
 }
 
 const STILL: &str = "position velocity acceleration angular_velocity angular_acceleration axis_x axis_y axis_z";
 
 /// Measures of everything that the balance needs, as text.
-fn measures(text: &str) -> String {
+pub fn measures(text: &str) -> String {
     let bare = checked(text, &[]).unwrap_or_else(|findings| panic!("{findings}"));
     let mut lines = String::new();
     let mut all = |prefix: &str, path: &str, unit: &str| {
@@ -52,8 +57,28 @@ fn measures(text: &str) -> String {
         all(&format!("{name}_force"), &format!("{name}.reaction.force"), "N");
         all(&format!("{name}_moment"), &format!("{name}.reaction.moment"), "N*m");
     }
+    for axis in bare.joints.iter().flat_map(|joint| &joint.axes) {
+        let (name, unit) = (&axis.name, if matches!(axis.motion, AxisMotion::Turn(_)) { "rad" } else { "m" });
+        for (word, per) in [("position", ""), ("velocity", "/s"), ("acceleration", "/s^2")] {
+            lines += &format!("measure {}_{word} [{unit}{per}] = {name}.{word}\n", name.replace('.', "_"));
+        }
+    }
+    for joint in bare.joints.iter().filter(|joint| joint.rotation.is_some()) {
+        let name = &joint.name;
+        lines += &format!("measure {name}_quaternion_w = {name}.quaternion.w\n");
+        for (word, unit) in [("quaternion", "1"), ("angular_velocity", "rad/s"), ("angular_acceleration", "rad/s^2")] {
+            for axis in ["x", "y", "z"] {
+                lines += &format!("measure {name}_{word}_{axis} [{unit}] = {name}.{word}.{axis}\n");
+            }
+        }
+    }
     for force in &bare.forces {
-        lines += &format!("measure {0}_load [N] = {0}.force\n", force.name);
+        let turns = |joint: usize, axis: usize| matches!(bare.joints[joint].axes[axis].motion, AxisMotion::Turn(_));
+        let (unit, word) = match force.place {
+            ForcePlace::Joint { joint, axis } if turns(joint, axis) => ("N*m", "torque"),
+            _ => ("N", "force"),
+        };
+        lines += &format!("measure {0}_load [{unit}] = {0}.{word}\n", force.name);
     }
     lines
 }
@@ -63,30 +88,39 @@ impl Mechanism {
         let text = format!("{text}{}criterion c = max(t / 1 s) in go\nsolver {{ tolerance = 1e-9 }}\n", measures(text));
         let study = checked(&text, &[]).unwrap_or_else(|findings| panic!("{findings}"));
         let channels = run(&text, &[]).remove(0);
-        Self { study, channels }
+        let samples = channels.values().next().map_or(0, Vec::len);
+        let times = (0..samples).map(|k| k as f64 * study.manoeuvres[0].step).collect();
+        Self { study, channels, times }
+    }
+
+    /// Without any samples yet.
+    pub fn still(study: Study) -> Self {
+        Self { study, channels: Channels::new(), times: vec![] }
     }
 
     fn samples(&self) -> usize {
         self.channels.values().next().map_or(0, Vec::len)
     }
 
-    fn value(&self, node: Node) -> f64 {
+    pub fn value(&self, node: Node) -> f64 {
         self.study.graph.constant_value(node).expect("numbers only")
     }
 
-    fn vector(&self, nodes: [Node; 3]) -> V {
+    pub fn vector(&self, nodes: [Node; 3]) -> V {
         V::from(nodes.map(|node| self.value(node)))
     }
 
-    fn three(&self, prefix: &str, sample: usize) -> V {
+    pub fn three(&self, prefix: &str, sample: usize) -> V {
         V::from(["x", "y", "z"].map(|axis| self.channels[&format!("{prefix}_{axis}")][sample]))
     }
 
-    fn motion(&self, body: &Body, k: usize) -> Motion {
+    pub fn motion(&self, body: &Body, k: usize) -> Motion {
         let own = |word: &str| self.three(&format!("{}_{word}", body.name), k);
         Motion {
             axes: M::from_columns(&[own("axis_x"), own("axis_y"), own("axis_z")]),
             origin: own("position"),
+            origin_velocity: own("velocity"),
+            origin_acceleration: own("acceleration"),
             centre: own("c_position"),
             velocity: own("c_velocity"),
             acceleration: own("c_acceleration"),
@@ -95,13 +129,13 @@ impl Mechanism {
         }
     }
 
-    fn inertia(&self, body: &Body, axes: M) -> M {
+    pub fn inertia(&self, body: &Body, axes: M) -> M {
         let [xx, yy, zz, xy, xz, yz] = body.inertia.map(|node| self.value(node));
         axes * M::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * axes.transpose()
     }
 
     /// Axes and place of a joint's end.
-    fn end(&self, end: &Attachment, k: usize) -> (M, V) {
+    pub fn end(&self, end: &Attachment, k: usize) -> (M, V) {
         let place = self.vector(end.position);
         match end.body {
             None => (M::identity(), place),
@@ -136,8 +170,11 @@ impl Mechanism {
             push(joint.parent.body, -force, -moment, at);
         }
         for element in &self.study.forces {
-            let ForcePlace::Between { first, second, along: None, .. } = &element.place else {
-                panic!("elements between points only")
+            // What stands on a joint belongs to what the joint transmits.
+            let (first, second) = match &element.place {
+                ForcePlace::Joint { .. } => continue,
+                ForcePlace::Between { first, second, along: None, .. } => (first, second),
+                place => panic!("elements on joints or between points only: {place:?}"),
             };
             let (a, b) = (self.end(first, k).1, self.end(second, k).1);
             let force = self.channels[&format!("{}_load", element.name)][k] * (b - a).normalize();
@@ -147,63 +184,80 @@ impl Mechanism {
         rest.iter().map(|(force, moment)| force.amax().max(moment.amax())).fold(0.0, f64::max)
     }
 
-    fn reaction(&self, joint: &Joint, k: usize) -> (V, V) {
+    pub fn reaction(&self, joint: &Joint, k: usize) -> (V, V) {
         (self.three(&format!("{}_force", joint.name), k), self.three(&format!("{}_moment", joint.name), k))
     }
 
-    /// How far a joint is from its definition (m, 1), and what its reaction does on its free motions (N, N m).
-    fn joint(&self, joint: &Joint, k: usize) -> (f64, f64) {
+    pub fn scalar(&self, path: &str, k: usize) -> f64 {
+        self.channels[&path.replace('.', "_")][k]
+    }
+
+    /// How far a joint is from its definition (m, 1), and what its reaction does on its free motions beside the elements
+    /// there (N, N m).
+    pub fn joint(&self, joint: &Joint, k: usize) -> (f64, f64) {
         let ((parent, at_parent), (child, at_child)) = (self.end(&joint.parent, k), self.end(&joint.child, k));
-        let orientation = joint.orientation.map_or(M::identity(), |rows| {
-            let rows = rows.map(|row| self.vector(row));
-            M::from_rows(&rows.map(|row| row.transpose()))
-        });
-        // Axes of the joint as either body carries them.
-        let of_child = child * orientation.transpose();
-        let distance = at_child - at_parent;
         let (force, moment) = self.reaction(joint, k);
         if joint.kind == JointKind::Distance {
+            let distance = at_child - at_parent;
             let length = self.value(joint.length.expect("a length"));
             let across = force - distance * (force.dot(&distance) / distance.norm_squared());
             return (distance.norm() - length, across.amax().max(moment.amax()));
         }
-        let pick = |turning: bool| -> Vec<(V, bool)> {
-            let axes = joint.axes.iter().filter(|axis| matches!(axis.motion, AxisMotion::Turn(_)) == turning);
-            axes.map(|axis| (V::from(axis.motion.direction()), axis.prescribed.is_none())).collect()
-        };
-        let (shifts, turns) = (pick(false), pick(true));
-        let shifts_first = joint.axes.iter().map(|axis| matches!(axis.motion, AxisMotion::Turn(_))).is_sorted();
-        let (carrier, moment) =
-            if shifts_first { (parent, moment) } else { (of_child, moment + distance.cross(&force)) };
-        let mut gap = distance;
-        let mut basis: Vec<V> = Vec::new();
-        for (shift, _) in &shifts {
-            let mut way = carrier * shift;
-            basis.iter().for_each(|other| way -= other * other.dot(&way));
-            basis.push(way.normalize());
-        }
-        basis.iter().for_each(|way| gap -= way * way.dot(&gap));
-        let mut error = gap.amax();
-        let mut work: f64 = shifts
-            .iter()
-            .filter(|(_, is_free)| *is_free)
-            .map(|(s, _)| force.dot(&(carrier * s)).abs())
-            .fold(0.0, f64::max);
-        match turns.as_slice() {
-            _ if joint.rotation.is_some() => work = work.max(moment.amax()),
-            [] => error = error.max((parent - of_child).amax()),
-            [(axis, is_free)] => {
-                error = error.max((parent * axis - of_child * axis).amax());
-                work = if *is_free { work.max(moment.dot(&(parent * axis)).abs()) } else { work };
+        // From the parent to the child, one motion after the other.
+        let (mut axes, mut place) = (parent, at_parent);
+        let (mut error, mut work) = (0.0_f64, 0.0_f64);
+        let number = self.study.joints.iter().position(|other| other.name == joint.name);
+        for (at, axis) in joint.axes.iter().enumerate() {
+            let coordinate = self.scalar(&format!("{}.position", axis.name), k);
+            let way = axes * V::from(axis.motion.direction());
+            let on_axis = match axis.motion {
+                AxisMotion::Shift(_) => force.dot(&way),
+                AxisMotion::Turn(_) => moment.dot(&way) + force.dot(&way.cross(&(at_child - place))),
+            };
+            match axis.motion {
+                AxisMotion::Shift(_) => place += way * coordinate,
+                AxisMotion::Turn(_) => axes = Rotation3::new(way * coordinate) * axes,
             }
-            [(first, _), (second, _)] => {
-                let [a, b] = [parent * first, of_child * second];
-                error = error.max((a.dot(&b) - first.dot(second)).abs());
-                work = work.max(moment.dot(&a).abs()).max(moment.dot(&b).abs());
+            match axis.prescribed {
+                Some(meant) => {
+                    let known = |symbol| if symbol == self.study.time { self.times[k] } else { f64::NAN };
+                    let meant = self.study.graph.evaluate(&[meant], known, |_, _, _| f64::NAN)[0];
+                    let turn = std::f64::consts::TAU;
+                    let apart = coordinate - meant;
+                    let turns = if matches!(axis.motion, AxisMotion::Turn(_)) { (apart / turn).round() } else { 0.0 };
+                    error = error.max((apart - turns * turn).abs());
+                }
+                None => {
+                    let own = |f: &&ident::study::Force| matches!(f.place, ForcePlace::Joint { joint: j, axis: a } if Some(j) == number && a == at);
+                    let load: f64 =
+                        self.study.forces.iter().filter(own).map(|f| self.scalar(&format!("{}.load", f.name), k)).sum();
+                    work = work.max((on_axis - load).abs());
+                }
             }
-            _ => work = work.max(moment.dot(&(parent * turns[0].0)).abs()),
         }
-        (error.abs(), work)
+        if let Some(rows) = joint.orientation {
+            let rows = rows.map(|row| self.vector(row));
+            axes *= M::from_rows(&rows.map(|row| row.transpose()));
+        }
+        if joint.rotation.is_some() {
+            let [w, x, y, z] =
+                ["w", "x", "y", "z"].map(|part| self.scalar(&format!("{}.quaternion.{part}", joint.name), k));
+            axes *= UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix();
+            let at = self.motion_of(joint.child.body, k).0 - self.motion_of(joint.parent.body, k).0;
+            let spin = child.transpose() * at;
+            error = error.max((spin - self.three(&format!("{}_angular_velocity", joint.name), k)).amax());
+            work = work.max(moment.amax());
+        }
+        error = error.max((place - at_child).amax()).max((axes - child).amax());
+        (error, work)
+    }
+
+    /// Angular velocity and acceleration, zero for ground.
+    fn motion_of(&self, body: Option<usize>, k: usize) -> (V, V) {
+        body.map_or((V::zeros(), V::zeros()), |body| {
+            let motion = self.motion(&self.study.bodies[body], k);
+            (motion.spin, motion.spin_rate)
+        })
     }
 
     fn energy(&self, k: usize) -> f64 {
@@ -249,6 +303,7 @@ fn prove(name: &str, text: &str, closed: f64) {
         assert!(drift < 1e-5, "{name}: the energy drifts by {drift:.1e}");
     }
     derivatives(name, &mechanism);
+    derivatives_of_coordinates(name, &mechanism);
 }
 
 /// Velocities and accelerations are derivatives: over each step of the samples by Simpson's rule on pairs of steps.
@@ -273,6 +328,37 @@ fn derivatives(name: &str, mechanism: &Mechanism) {
     }
 }
 
+/// The same for the coordinates of joints.
+#[track_caller]
+fn derivatives_of_coordinates(name: &str, mechanism: &Mechanism) {
+    let step = mechanism.study.manoeuvres[0].step;
+    let axes = mechanism.study.joints.iter().flat_map(|joint| &joint.axes).map(|axis| axis.name.replace('.', "_"));
+    let mut pairs: Vec<(String, String)> = axes
+        .flat_map(|axis| ["position velocity", "velocity acceleration"].map(|pair| (axis.clone(), pair)))
+        .map(|(axis, pair)| {
+            pair.split_once(' ').map(|(of, rate)| (format!("{axis}_{of}"), format!("{axis}_{rate}"))).expect("a pair")
+        })
+        .collect();
+    for joint in mechanism.study.joints.iter().filter(|joint| joint.rotation.is_some()) {
+        let word = |word: &str, axis: &str| format!("{}_angular_{word}_{axis}", joint.name);
+        pairs.extend(["x", "y", "z"].map(|axis| (word("velocity", axis), word("acceleration", axis))));
+    }
+    for (of, rate) in pairs {
+        let (values, rates) = (&mechanism.channels[&of], &mechanism.channels[&rate]);
+        for (three, slopes) in values.windows(3).zip(rates.windows(3)) {
+            let simpson = (slopes[0] + 4.0 * slopes[1] + slopes[2]) * (step / 3.0);
+            let largest = slopes.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            // Angles that are read off jump by a turn.
+            let turn = std::f64::consts::TAU;
+            let apart = three[2] - three[0] - simpson;
+            let rest = (apart - turn * (apart / turn).round()).abs();
+            assert!(rest < 1e-7 + 2e-3 * largest * 2.0 * step, "{name}: {rate} is not the derivative: {rest:.1e}");
+        }
+    }
+}
+
+const HOLDING: &str =
+    "law holding(x: coordinate, v: rate, gain: load/coordinate) -> load { = -gain * x - gain * 0.1 s * v }\n";
 const GO: &str = "manoeuvre go { for 200 ms, step = 2 ms, start = rest";
 
 #[test]
@@ -315,12 +401,26 @@ fn trees_of_every_kind_of_joint() {
     for (number, (kind, fields, start)) in joints.iter().enumerate() {
         for is_reversed in [false, true] {
             let ends = if is_reversed { "outer.tip -> inner.tip" } else { "inner.tip -> outer.tip" };
-            let text = format!(
-                "{}{}joint root: revolute(0, 0.6, 0.8) ground -> inner\njoint j: {kind} {ends} {fields}\n{GO} {{ root.velocity = 2.5 rad/s, j.{start} }} }}\n",
+            let head = format!(
+                "{}{}joint root: revolute(0, 0.6, 0.8) ground -> inner\njoint j: {kind} {ends} {fields}\n",
                 body("inner"),
                 body("outer"),
             );
-            prove(&format!("tree_{number}_{is_reversed}"), &text, 1e-9);
+            let start = format!("{GO} {{ root.velocity = 2.5 rad/s, j.{start} }} }}\n");
+            prove(&format!("tree_{number}_{is_reversed}"), &format!("{head}{start}"), 1e-9);
+            let study = checked(&format!("study s\n{head}"), &[]).unwrap_or_else(|findings| panic!("{findings}"));
+            let elements: String = study.joints[1]
+                .axes
+                .iter()
+                .enumerate()
+                .map(|(at, axis)| {
+                    let gain = if matches!(axis.motion, AxisMotion::Turn(_)) { "9 N*m" } else { "400 N/m" };
+                    format!("force on_{at}: holding on {} {{ gain = {gain} }}\n", axis.name)
+                })
+                .collect();
+            if !elements.is_empty() {
+                prove(&format!("held_{number}_{is_reversed}"), &format!("{head}{HOLDING}{elements}{start}"), 1e-9);
+            }
         }
     }
 }
@@ -464,6 +564,81 @@ fn every_kind_of_joint_closes_a_loop() {
             ["first", "arm", "run", "third", "slider"].map(link).concat()
         );
         prove(&format!("closing_{number}"), &text, 1e-8);
+    }
+}
+
+/// Three bodies on three joints, each with a prescribed motion: one of them closes the loop.
+fn driven_loop(kind: &str, ends: &str, fields: &str, (element, head): (&str, &str)) -> String {
+    let link = |name: &str| {
+        format!(
+            "body {name} {{ mass = 1.2 kg, inertia = (0.02, 0.03, 0.04, 0.002, -0.001, 0.003 kg*m^2), centre_of_gravity = (0.1 m, 0.05 m, -0.02 m), point tip = (0.4 m, 0.05 m, 0 m) }}\n"
+        )
+    };
+    format!(
+        "{}{}body ground {{ point home = (0.35 m, 0.1 m, 0.05 m) }}
+         {HOLDING}         joint lift: cylindrical(z) ground -> a {{ motion = {{ shift_z = 0.05 m * sin(7 rad/s * t) }} }}
+         joint head: axes(turn x, turn y, turn z) a.tip -> b {{ motion = {{ {head} = 0.3 * sin(9 rad/s * t) }}, orientation = (10 deg, 0 deg, 20 deg) }}
+         joint pin: {kind} {ends} {{ {fields} }}
+         {element}
+         {GO} {{ lift.turn_z.velocity = 1 rad/s }} }}\n",
+        link("a"),
+        link("b")
+    )
+}
+
+#[test]
+fn closing_joints_may_be_driven() {
+    let shift = "0.04 m * sin(6 rad/s * t)";
+    let turn = "0.3 * sin(5 rad/s * t)";
+    let cases = [
+        ("axes(shift x, shift y, shift z, turn z, turn x)", format!("motion = {{ shift_y = {shift} }}")),
+        ("axes(shift x, shift y, shift z, turn z, turn x)", format!("motion = {{ turn_z = {turn} }}")),
+        (
+            "axes(shift x, shift y, shift z, turn z, turn x)",
+            format!("motion = {{ turn_x = {turn} }}, orientation = (0 deg, 0 deg, 15 deg)"),
+        ),
+        ("axes(turn z, turn y, shift x, shift y, shift z)", format!("motion = {{ turn_z = {turn} }}")),
+        ("axes(turn z, turn y, shift x, shift y, shift z)", format!("motion = {{ shift_x = {shift} }}")),
+        ("axes(turn z, turn y, shift (0.6, 0, 0.8), shift y, shift z)", format!("motion = {{ shift_y = {shift} }}")),
+        (
+            "axes(shift x, turn z, turn x, turn y, shift (0.6, 0, 0.8))",
+            format!("motion = {{ turn_y = {turn} }}, orientation = (0 deg, 0 deg, 15 deg)"),
+        ),
+        ("free", format!("motion = {{ shift_x = {shift}, shift_z = {shift} }}")),
+    ];
+    for (number, (kind, fields)) in cases.iter().enumerate() {
+        for (way, ends) in [("out", "b.tip -> ground.home"), ("in", "ground.home -> b.tip")] {
+            // What the pin turns about x, the head does not.
+            let head = if fields.contains("turn_x =") { "turn_z" } else { "turn_x" };
+            prove(&format!("driven_{number}_{way}"), &driven_loop(kind, ends, fields, ("", head)), 1e-8);
+        }
+    }
+}
+
+/// Elements on every coordinate of a joint that closes a loop do there what they do anywhere.
+#[test]
+fn closing_joints_carry_elements_on_all_coordinates() {
+    let cases = [
+        (
+            "axes(shift x, shift (0.6, 0.8, 0), shift z, turn z, turn (1, 0, 1))",
+            "shift_x shift_2 shift_z",
+            "turn_z turn_5",
+        ),
+        ("axes(turn z, turn x, shift x, shift y, shift (0, 0.6, 0.8))", "shift_x shift_y shift_5", "turn_z turn_x"),
+        ("axes(shift x, shift z, turn z, turn x, shift y)", "shift_x shift_y shift_z", "turn_z turn_x"),
+        ("axes(shift x, shift y, turn z, turn y, turn x)", "shift_x shift_y", "turn_x turn_y turn_z"),
+    ];
+    for (number, (kind, shifts, turns)) in cases.iter().enumerate() {
+        let on = |axes: &str, gain: &str| -> String {
+            let lines = axes
+                .split_whitespace()
+                .map(|axis| format!("force on_{axis}: holding on pin.{axis} {{ gain = {gain} }}\n"));
+            lines.collect()
+        };
+        let elements = on(shifts, "300 N/m") + &on(turns, "4 N*m");
+        for (way, ends) in [("out", "b.tip -> ground.home"), ("in", "ground.home -> b.tip")] {
+            prove(&format!("carrying_{number}_{way}"), &driven_loop(kind, ends, "", (&elements, "turn_x")), 1e-8);
+        }
     }
 }
 

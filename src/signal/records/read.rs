@@ -122,17 +122,29 @@ fn read_head(path: &Path, head: &csv::StringRecord) -> Result<Vec<Column>, DataE
     Ok(columns)
 }
 
-/// `name [unit]`
+/// `name [unit]`; whole numbers in brackets that follow the name without a blank are its index (`z[1] [mm]`).
 fn split_head(cell: &str) -> (String, Option<String>) {
     if let Some(start) = cell.rfind('[')
         && let Some(end) = cell[start..].find(']')
         && cell[start + end + 1..].trim().is_empty()
+        && !is_index(&cell[..start], &cell[start + 1..start + end])
     {
         let unit = cell[start + 1..start + end].trim();
         let unit = if unit.is_empty() || unit == "-" { "1" } else { unit };
         return (cell[..start].trim().to_owned(), Some(unit.to_owned()));
     }
-    (cell.trim().to_owned(), None)
+    // Blanks within an index do not tell names apart.
+    let mut name = cell.trim().to_owned();
+    if name.contains('[') {
+        name.retain(|sign| !sign.is_whitespace());
+    }
+    (name, None)
+}
+
+fn is_index(name: &str, inside: &str) -> bool {
+    let number =
+        |part: &str| !part.trim().is_empty() && part.trim().trim_start_matches('-').bytes().all(|b| b.is_ascii_digit());
+    name.ends_with(|last: char| last.is_alphanumeric() || last == '_') && inside.split(',').all(number)
 }
 
 /// Units may stand in a line of their own below the names, where the names carry none.

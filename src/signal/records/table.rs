@@ -46,8 +46,11 @@ impl Table {
             Some(unit) => without_blanks(wanted) == without_blanks(&format!("{}[{unit}]", column.name)),
             None => false,
         };
-        let found = self.columns.iter().find(|column| column.name == wanted);
-        found.or_else(|| self.columns.iter().find(by_head)).ok_or_else(|| self.missing(wanted))
+        // `ratio[1]` is a member of a family or, where nothing else has the name, a dimensionless quantity.
+        let by_unit_one = |column: &&Column| column.unit.is_none() && column.name.strip_suffix("[1]") == Some(wanted);
+        let find = |is_meant: &dyn Fn(&&Column) -> bool| self.columns.iter().find(is_meant);
+        let by_name = |column: &&Column| column.name == wanted;
+        find(&by_name).or_else(|| find(&by_head)).or_else(|| find(&by_unit_one)).ok_or_else(|| self.missing(wanted))
     }
 
     fn missing(&self, name: &str) -> DataError {

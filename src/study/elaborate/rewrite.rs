@@ -32,7 +32,10 @@ impl Elaborator<'_, '_> {
                 self.declared_name(name, scope);
                 self.expression(value, None, scope);
             }
-            ItemKind::Input { name, fields, .. } => self.named_fields(name, fields, scope),
+            ItemKind::Input { name, title, fields, .. } => {
+                self.named_fields(name, fields, scope);
+                self.title(title, scope);
+            }
             ItemKind::Body { name, fields, points } => {
                 self.named_fields(name, fields, scope);
                 let path = name.text.clone();
@@ -48,25 +51,38 @@ impl Elaborator<'_, '_> {
                 self.named_fields(name, fields, scope);
                 self.place(place, scope);
             }
-            ItemKind::Measure { name, value, fields, .. } => {
+            ItemKind::Measure { name, title, value, fields, .. } => {
                 self.named_fields(name, fields, scope);
+                self.title(title, scope);
                 self.expression(value, None, scope);
             }
             ItemKind::Group { name, members } => {
                 self.declared_name(name, scope);
                 members.iter_mut().for_each(|member| self.reference(member, scope));
             }
-            ItemKind::Manoeuvre { durations, fields, .. } => {
+            ItemKind::Manoeuvre { name, title, durations, fields } => {
+                self.declared_name(name, scope);
+                self.title(title, scope);
                 durations.iter_mut().for_each(|duration| {
                     self.expression(duration, None, scope);
                 });
                 self.experiment_fields(fields, scope);
             }
-            ItemKind::Criterion { name, value, fields, .. } => {
+            ItemKind::Criterion { name, title, value, manoeuvre, fields, .. } => {
                 self.named_fields(name, fields, scope);
+                self.title(title, scope);
+                let word = manoeuvre.text.split('[').next().unwrap_or_default();
+                if scope.locals.contains(word) {
+                    self.reference(manoeuvre, scope);
+                } else if let Some(path) = self.indexed(manoeuvre, scope) {
+                    manoeuvre.text = path;
+                }
                 self.expression(value, None, scope);
             }
-            ItemKind::Experiment { fields, .. } => self.experiment_fields(fields, scope),
+            ItemKind::Experiment { name, fields, .. } => {
+                self.declared_name(name, scope);
+                self.experiment_fields(fields, scope);
+            }
             ItemKind::Identify { lines, constraints } => {
                 lines.iter_mut().for_each(|line| self.identify_line(line, scope));
                 constraints.iter_mut().for_each(|constraint| {
@@ -129,7 +145,29 @@ impl Elaborator<'_, '_> {
             }
             Value::Block { fields, .. } => self.fields(fields, path, scope),
             Value::List(names, _) => names.iter_mut().for_each(|name| self.reference(name, scope)),
-            Value::Text(_) => {}
+            Value::Text(text) => self.text(text, scope),
+        }
+    }
+
+    /// Within families `{i}` in a text stands for the index: `data = "run_{i}.csv"`.
+    fn text(&mut self, text: &mut Name, scope: &Scope) {
+        if scope.variables.is_empty() {
+            return;
+        }
+        let mut rest = std::mem::take(&mut text.text);
+        while let Some((before, index, behind)) = braced(&rest) {
+            text.text += before;
+            if let Some(number) = self.index(index, text.span, scope) {
+                text.text += number.trim_matches(['[', ']']);
+            }
+            rest = behind.to_owned();
+        }
+        text.text += &rest;
+    }
+
+    fn title(&mut self, title: &mut Option<Name>, scope: &Scope) {
+        if let Some(title) = title {
+            self.text(title, scope);
         }
     }
 
@@ -360,6 +398,13 @@ impl Elaborator<'_, '_> {
         }
         Some(path)
     }
+}
+
+/// What stands before, between and behind the first pair of braces.
+fn braced(text: &str) -> Option<(&str, &str, &str)> {
+    let (before, rest) = text.split_once('{')?;
+    let (index, behind) = rest.split_once('}')?;
+    Some((before, index.trim(), behind))
 }
 
 fn whole_number(value: i64, name: &Name) -> Expression {
