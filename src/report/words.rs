@@ -1,6 +1,6 @@
 //! Wording shared by all forms of a report.
 
-use crate::analyse::{self, CriterionValidity, Demand};
+use crate::analyse::{self, Combination, CriterionValidity, Demand, Plan};
 use crate::diagnose::{Answer, Candidate, Refit, Step, Verdict};
 use crate::identify::{Identification, RecordFit};
 use crate::report::number;
@@ -109,4 +109,29 @@ pub fn validity_colour(criterion: &CriterionValidity) -> &'static str {
         (analyse::Verdict::Valid, _) => "1;32",
         (analyse::Verdict::CannotBeJudged, _) => "1;33",
     }
+}
+
+/// Value of a combination and that with everything offered, with their units.
+pub fn combination_values(plan: &Plan, choice: &Combination) -> (String, String) {
+    let criteria = &plan.together.criteria;
+    let unit = criteria.iter().find(|criterion| criterion.name == choice.measure).map(|criterion| &criterion.unit);
+    let shown = |value: f64| match unit {
+        Some(unit) => format!("{} {unit}", number::significant(value, 3)),
+        None => format!("{} %", number::significant(100.0 * value, 3)),
+    };
+    (shown(choice.value), shown(choice.with_everything))
+}
+
+/// What the list of combinations means.
+pub fn combination_note(plan: &Plan) -> &'static str {
+    if plan.combinations.iter().all(|choice| choice.exact) {
+        "D and A in % of the bounds, criteria as their standard deviation. Each line is the best of all choices of its size; larger ones are listed where they gain at least 5 %."
+    } else {
+        "D and A in % of the bounds, criteria as their standard deviation. Tests and sensors were added one after the other and exchanged; larger choices are listed where they gain at least 5 %."
+    }
+}
+
+/// A factor on a test: whole repetitions above one.
+pub fn repetitions(factor: f64) -> String {
+    if factor > 1.0 { number::fixed(factor.ceil(), 0) } else { number::significant(factor, 2) }
 }

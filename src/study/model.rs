@@ -383,6 +383,11 @@ impl Measure {
     pub fn shown(&self, value: f64) -> f64 {
         self.quantisation.map_or(value, |step| (value / step).round() * step)
     }
+
+    /// Standard deviation of the rounding, SI; 0 without. Steps q are noise of the variance q^2 / 12 (Widrow-1961).
+    pub fn rounding(&self) -> f64 {
+        self.quantisation.map_or(0.0, |step| step / 12f64.sqrt())
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -112,3 +112,40 @@ fn what_no_test_determines_is_named_before() {
     );
     assert!(helped.together.undetermined.is_empty());
 }
+
+/// Every listed choice is the best of its size by an independent count, and more is listed only where it helps; what limits the test is
+/// named with the repetitions that deviations over roots promise.
+#[test]
+fn tests_and_sensors_are_chosen_together() {
+    let compiled = spring_slide();
+    let options = options(&compiled);
+    let plan = planned(&compiled, &options);
+    let of = |measure: &str| plan.combinations.iter().filter(|c| c.measure == measure).cloned().collect::<Vec<_>>();
+    for measure in ["D", "A", "travel"] {
+        let listed = of(measure);
+        assert!(!listed.is_empty() && listed.iter().all(|choice| choice.exact), "{measure}");
+        for (k, choice) in listed.iter().enumerate() {
+            let smaller = listed[..k].iter().filter(|other| {
+                other.sensors.len() <= choice.sensors.len() && other.excitations.len() <= choice.excitations.len()
+            });
+            assert!(smaller.into_iter().all(|other| choice.value < 0.96 * other.value), "{measure}: {listed:?}");
+        }
+        let last = listed.last().expect("listed");
+        assert!(last.value <= 1.06 * last.with_everything && last.value >= last.with_everything, "{last:?}");
+    }
+    // One test with one sensor: what the excitation's table says.
+    let single = of("D").into_iter().find(|c| c.sensors.len() == 1 && c.excitations.len() == 1).expect("one each");
+    let alone = plan.excitations.iter().flat_map(|e| e.sensors.iter().filter_map(move |s| Some((s.alone?, e, s))));
+    let best = alone.min_by(|a, b| a.0.total_cmp(&b.0)).expect("one that determines all");
+    assert_eq!((&single.excitations[0], &single.sensors[0]), (&best.1.name, &best.2.name));
+    assert!((single.value / best.0 - 1.0).abs() < 1e-9);
+    for excitation in &plan.excitations {
+        let factors: Vec<f64> = excitation.needs.iter().map(|need| need.repetitions.expect("determined")).collect();
+        for (need, parameter) in excitation.needs.iter().zip(&excitation.outcome.parameters) {
+            let half_width = 1.959_964 * parameter.standard_deviation.expect("determined");
+            assert!((need.repetitions.expect("determined") / (half_width / need.wanted).powi(2) - 1.0).abs() < 1e-4);
+        }
+        let most = factors.iter().copied().fold(1.0, f64::max).ceil();
+        assert_eq!(excitation.repetitions, Some(most), "{}", excitation.name);
+    }
+}

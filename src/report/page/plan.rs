@@ -2,7 +2,7 @@
 
 use crate::analyse::{Excitation, Outcome, Plan};
 use crate::report::chart::{Bar, Style, bars};
-use crate::report::number;
+use crate::report::{number, words};
 use serde::Serialize;
 
 const BAR_WIDTH: f64 = 260.0;
@@ -12,6 +12,8 @@ pub struct PlanPage {
     title: String,
     study: String,
     best: Vec<String>,
+    combinations: Vec<CombinationView>,
+    combination_note: &'static str,
     excitations: Vec<ExcitationView>,
     fix: Vec<String>,
     remarks: Vec<String>,
@@ -31,7 +33,27 @@ struct ExcitationView {
     parameters: Vec<ParameterView>,
     undetermined: Vec<String>,
     criteria: Vec<String>,
+    needs: Vec<NeedView>,
     sensors: Vec<SensorView>,
+}
+
+#[derive(Serialize)]
+struct CombinationView {
+    measure: String,
+    excitations: String,
+    sensors: String,
+    value: String,
+    everything: String,
+}
+
+#[derive(Serialize)]
+struct NeedView {
+    name: String,
+    unit: String,
+    wanted: String,
+    duration: String,
+    repetitions: String,
+    rate: String,
 }
 
 #[derive(Serialize)]
@@ -64,11 +86,28 @@ pub fn view(plan: &Plan) -> PlanPage {
         title: "What tests would tell".to_owned(),
         study: format!("{}, variant {}", plan.study, plan.variant),
         best: best.collect(),
+        combinations: combinations(plan),
+        combination_note: words::combination_note(plan),
         excitations: plan.excitations.iter().map(excitation).collect(),
         fix: plan.fix.clone(),
         remarks: plan.remarks.clone(),
         accuracy: number::short(plan.accuracy, 3),
     }
+}
+
+/// Each measure is named once, before its first line.
+fn combinations(plan: &Plan) -> Vec<CombinationView> {
+    let mut before = "";
+    plan.combinations
+        .iter()
+        .map(|choice| {
+            let (value, everything) = words::combination_values(plan, choice);
+            let measure = if choice.measure == before { String::new() } else { choice.measure.clone() };
+            before = &choice.measure;
+            let (excitations, sensors) = (choice.excitations.join(", "), choice.sensors.join(", "));
+            CombinationView { measure, excitations, sensors, value, everything }
+        })
+        .collect()
 }
 
 fn share(value: Option<f64>) -> String {
@@ -100,6 +139,20 @@ fn excitation(excitation: &Excitation) -> ExcitationView {
                     format!("{}: deviation {} {}", criterion.name, number::significant(deviation, 3), criterion.unit)
                 }
                 None => format!("{}: depends on what is not determined", criterion.name),
+            })
+            .collect(),
+        needs: excitation
+            .needs
+            .iter()
+            .map(|need| NeedView {
+                name: need.name.clone(),
+                unit: need.unit.clone(),
+                wanted: number::significant(need.wanted, 3),
+                duration: need
+                    .duration
+                    .map_or("not at all".to_owned(), |time| format!("{} s", number::significant(time, 2))),
+                repetitions: need.repetitions.map_or("never".to_owned(), words::repetitions),
+                rate: need.rate.map_or(String::new(), |rate| number::significant(rate, 2)),
             })
             .collect(),
         sensors: excitation

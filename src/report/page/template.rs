@@ -3,8 +3,9 @@
 use minijinja::{AutoEscape, Environment, context, value::Serde};
 use serde::Serialize;
 
-const TEMPLATES: [(&str, &str); 7] = [
+const TEMPLATES: [(&str, &str); 8] = [
     ("layout.html", include_str!("layout.html")),
+    ("titled.html", include_str!("titled.html")),
     ("parts.html", include_str!("parts.html")),
     ("answer.html", include_str!("answer.html")),
     ("fit.html", include_str!("fit.html")),

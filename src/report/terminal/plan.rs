@@ -4,15 +4,16 @@ use super::Colour;
 use super::sheet::Sheet;
 use super::table::{Lean, Table};
 use crate::analyse::{Excitation, Outcome, Plan};
-use crate::report::number;
+use crate::report::{number, words};
 
 pub fn text(plan: &Plan, colour: Colour) -> String {
     let mut sheet = Sheet::new(colour);
     sheet.heading(&format!("Tests for {} (variant {})", plan.study, plan.variant));
     best(&mut sheet, plan);
     excitations(&mut sheet, plan);
+    combinations(&mut sheet, plan);
     for excitation in &plan.excitations {
-        section(&mut sheet, excitation, plan.accuracy);
+        section(&mut sheet, excitation);
     }
     if plan.excitations.len() > 1 {
         sheet.heading("All excitations together");
@@ -73,19 +74,40 @@ fn excitations(sheet: &mut Sheet, plan: &Plan) {
     sheet.table(&table, 2);
 }
 
-fn section(sheet: &mut Sheet, excitation: &Excitation, accuracy: f64) {
+/// Best choices of tests and sensors, growing.
+fn combinations(sheet: &mut Sheet, plan: &Plan) {
+    if plan.combinations.is_empty() {
+        return;
+    }
+    sheet.heading("Tests and sensors that belong together");
+    let mut table = Table::new(&[
+        ("by", Lean::Left),
+        ("excitations", Lean::Left),
+        ("sensors", Lean::Left),
+        ("value", Lean::Right),
+        ("with everything", Lean::Right),
+    ]);
+    let mut before = "";
+    for choice in &plan.combinations {
+        let (value, everything) = words::combination_values(plan, choice);
+        table.row(vec![
+            if choice.measure == before { String::new() } else { choice.measure.clone() },
+            choice.excitations.join(", "),
+            choice.sensors.join(", "),
+            value,
+            everything,
+        ]);
+        before = &choice.measure;
+    }
+    sheet.table(&table, 2);
+    sheet.paragraph(words::combination_note(plan), 2);
+}
+
+fn section(sheet: &mut Sheet, excitation: &Excitation) {
     let title = if excitation.title.is_empty() { String::new() } else { format!(", {}", excitation.title) };
     sheet.heading(&format!("{}{title}", excitation.name));
     outcome(sheet, &excitation.outcome);
-    if excitation.sufficient_duration.is_none()
-        && let Some(times) = excitation.repetitions
-    {
-        sheet.item(&format!(
-            "{} repetitions, or that factor on the sampling rate as long as the noise stays white, bring all parameters to +- {} %",
-            number::fixed(times, 0),
-            number::short(accuracy, 3)
-        ));
-    }
+    needs(sheet, excitation);
     let mut table = Table::new(&[("sensor", Lean::Left), ("D alone", Lean::Right), ("D without it", Lean::Right)]);
     for sensor in excitation.sensors.iter().filter(|_| excitation.sensors.len() > 1) {
         table.row(vec![sensor.name.clone(), share(sensor.alone), share(sensor.without)]);
@@ -93,6 +115,30 @@ fn section(sheet: &mut Sheet, excitation: &Excitation, accuracy: f64) {
     if excitation.sensors.len() > 1 {
         sheet.table(&table, 2);
     }
+}
+
+/// What the wanted accuracy takes, one by one.
+fn needs(sheet: &mut Sheet, excitation: &Excitation) {
+    let mut table = Table::new(&[
+        ("wanted", Lean::Left),
+        ("+-", Lean::Right),
+        ("unit", Lean::Left),
+        ("reached after", Lean::Right),
+        ("or repetitions", Lean::Right),
+        ("or rate [Hz]", Lean::Right),
+    ]);
+    for need in &excitation.needs {
+        table.row(vec![
+            need.name.clone(),
+            number::significant(need.wanted, 3),
+            need.unit.clone(),
+            need.duration.map_or("not at all".into(), |time| format!("{} s", number::significant(time, 2))),
+            need.repetitions.map_or("never".into(), words::repetitions),
+            need.rate.map_or(String::new(), |rate| number::significant(rate, 2)),
+        ]);
+    }
+    sheet.table(&table, 2);
+    sheet.paragraph("Repetitions and rates (not below the useful one) count as long as the noise stays white.", 2);
 }
 
 fn outcome(sheet: &mut Sheet, outcome: &Outcome) {

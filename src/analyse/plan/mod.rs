@@ -1,5 +1,7 @@
 //! What tests would tell, before they are made (method 7, 8; Atkinson-2007 for the measures of a design).
 
+mod combinations;
+
 use super::criterion::evaluate;
 use crate::fit::PriorRow;
 use crate::linear::SingularValueDecomposition;
@@ -7,6 +9,8 @@ use crate::signal::welch;
 use crate::simulation::{Compiled, Gradient, Record, Trajectory, excitation, simulate};
 use crate::statistics::{Covariance, identifiability, normal_quantile};
 use crate::study::{Parameter, Study};
+pub use combinations::Combination;
+use combinations::{Chosen, Offer, Worth};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -17,6 +21,10 @@ const ASSUMED_NOISE: f64 = 0.01;
 const RANK_THRESHOLD: f64 = 1e-6;
 /// A parameter whose deviation would exceed this share of its bounds is better given a value.
 const HARDLY_DETERMINED: f64 = 0.25;
+/// Information beside which a parameter counts as held, in units of the largest there is.
+const HELD: f64 = 1e4;
+/// Deviations that fall below this share of what they were are worth a word.
+const NOTABLY: f64 = 0.9;
 /// The useful band holds this share of the power of all sensitivities; samples should come ten times as fast as its end.
 const BAND_SHARE: f64 = 0.99;
 const SAMPLES_PER_PERIOD: f64 = 10.0;
@@ -47,6 +55,8 @@ pub struct Plan {
     pub together: Outcome,
     /// Best excitation by the volume of the confidence ellipsoid (D), by the mean variance (A), by each criterion.
     pub best: Vec<Best>,
+    /// By the same measures: the best choices of tests and sensors, growing, as long as more of them help.
+    pub combinations: Vec<Combination>,
     /// Parameters that are better given a value than identified, and why.
     pub fix: Vec<String>,
     pub remarks: Vec<String>,
@@ -73,13 +83,33 @@ pub struct Excitation {
     pub outcome: Outcome,
     /// Rate that resolves what the parameters do, Hz.
     pub useful_rate: f64,
-    /// Duration after which every parameter is as accurate as wanted, s; absent where the whole manoeuvre is not enough.
+    /// Duration after which every parameter and criterion is as accurate as wanted, s; absent where the whole manoeuvre is not
+    /// enough.
     pub sufficient_duration: Option<f64>,
-    /// Repetitions (or factor on the rate, as long as the noise stays white) that make every parameter as accurate as wanted;
-    /// absent where a parameter stays undetermined.
+    /// Repetitions (or factor on the rate, as long as the noise stays white) that make every parameter and criterion as accurate as
+    /// wanted; absent where something stays undetermined.
     pub repetitions: Option<f64>,
+    /// The same one by one.
+    pub needs: Vec<Need>,
     /// What each sensor is worth here, the most valuable first.
     pub sensors: Vec<Sensor>,
+}
+
+/// How much of a manoeuvre a wanted accuracy takes.
+#[derive(Clone, Debug, JsonSchema, Serialize)]
+pub struct Need {
+    /// Of a parameter, or of a criterion that states `within`.
+    pub name: String,
+    pub unit: String,
+    /// Wanted half-width of the interval: at 95 % for parameters, at its own confidence for a criterion.
+    pub wanted: f64,
+    /// Duration after which it is as accurate, s; absent where the whole manoeuvre is not enough.
+    pub duration: Option<f64>,
+    /// Repetitions, or factor on the sampling rate as long as the noise stays white: a fraction where less than the manoeuvre is
+    /// enough; absent where it stays undetermined.
+    pub repetitions: Option<f64>,
+    /// The rate that does it in the manoeuvre's duration, not below the useful one, Hz.
+    pub rate: Option<f64>,
 }
 
 /// What would be known.
@@ -151,12 +181,13 @@ pub fn plan(compiled: &Compiled, options: &PlanOptions) -> Result<Plan, String> 
         })
         .collect();
     let noise = noise(study, &tests, &mut remarks);
-    let (mut excitations, mut all) = (Vec::new(), planner.before.clone());
+    let (mut excitations, mut all, mut offered) = (Vec::new(), planner.before.clone(), Vec::new());
     for (index, (record, trajectory)) in tests.iter().enumerate() {
         match trajectory.as_ref().map_err(Clone::clone).and_then(|found| planner.knowledge(record, found, &noise)) {
             Ok(knowledge) => {
                 knowledge.per_sensor.iter().for_each(|information| add(&mut all, information));
                 excitations.push(planner.excitation(index, record, &knowledge));
+                offered.push(knowledge.per_sensor);
             }
             Err(explanation) => remarks.push(format!("{} could not be simulated: {explanation}", record.name)),
         }
@@ -170,7 +201,8 @@ pub fn plan(compiled: &Compiled, options: &PlanOptions) -> Result<Plan, String> 
         variant: study.variant.clone(),
         accuracy: 100.0 * options.accuracy,
         best: best(&excitations),
-        fix: planner.fix(&together),
+        combinations: planner.combinations(&excitations, &offered),
+        fix: planner.fix(&together, &all),
         together,
         excitations,
         remarks,
@@ -193,7 +225,7 @@ fn noise(study: &Study, tests: &[(Record, Result<Trajectory, String>)], remarks:
                 measure.name,
                 100.0 * ASSUMED_NOISE
             ));
-            value
+            value.hypot(measure.rounding())
         }));
     }
     noise
@@ -300,16 +332,21 @@ impl<'a> Planner<'a> {
         // The greater the loss without it, the more valuable.
         let loss = |sensor: &Sensor| sensor.without.unwrap_or(f64::INFINITY);
         sensors.sort_by(|a, b| loss(b).total_cmp(&loss(a)));
-        let enough = knowledge.growth.iter().find(|(_, sum)| self.shortfall(sum).is_some_and(|factor| factor <= 1.0));
+        let rate = 1.0 / record.sample_step();
+        let needs = self.needs(&all, knowledge, rate);
+        let every = |value: fn(&Need) -> Option<f64>| {
+            needs.iter().map(value).try_fold(0.0_f64, |most, own| Some(most.max(own?)))
+        };
         Excitation {
             name: manoeuvre.name.clone(),
             title: manoeuvre.title.clone(),
             duration: manoeuvre.duration,
-            rate: 1.0 / record.sample_step(),
+            rate,
             outcome: self.outcome(&all),
             useful_rate: knowledge.useful_rate,
-            sufficient_duration: enough.map(|(until, _)| *until),
-            repetitions: self.shortfall(&all).map(|factor| factor.max(1.0).ceil()),
+            sufficient_duration: every(|need| need.duration),
+            repetitions: every(|need| need.repetitions).map(|factor| factor.max(1.0).ceil()),
+            needs,
             sensors,
         }
     }
@@ -331,17 +368,109 @@ impl<'a> Planner<'a> {
         Covariance::new(&self.root(information)?, &self.scale, 1.0, None, RANK_THRESHOLD).ok()
     }
 
-    /// Factor by which the information must grow so that all 95 % half-widths are as wanted.
-    fn shortfall(&self, information: &[f64]) -> Option<f64> {
-        let covariance = self.covariance(information)?;
-        let mut worst = 0.0_f64;
-        for (deviation, value) in covariance.standard_deviations.iter().zip(&self.options.theta) {
-            let wanted = self.options.accuracy * value.abs();
-            if wanted > 0.0 {
-                worst = worst.max((normal_quantile(0.975) * (*deviation)? / wanted).powi(2));
-            }
+    /// Everything whose accuracy is wanted.
+    fn demands(&self) -> Vec<Demanded> {
+        let study = &self.compiled.study;
+        let parameters = study.parameters.iter().zip(&self.options.theta).enumerate();
+        let mut demands: Vec<Demanded> = parameters
+            .map(|(j, (parameter, value))| Demanded {
+                name: parameter.name.clone(),
+                unit: parameter.unit.symbol.clone(),
+                wanted: self.options.accuracy * value.abs(),
+                shown: parameter.unit.difference_from_si(self.options.accuracy * value.abs()),
+                quantile: normal_quantile(0.975),
+                gradient: (0..self.scale.len()).map(|k| if k == j { 1.0 } else { 0.0 }).collect(),
+            })
+            .collect();
+        for (criterion, gradient) in study.criteria.iter().zip(&self.criteria) {
+            demands.extend(criterion.within.map(|within| Demanded {
+                name: criterion.name.clone(),
+                unit: criterion.unit.symbol.clone(),
+                wanted: within,
+                shown: criterion.unit.difference_from_si(within),
+                quantile: normal_quantile(0.5 + 0.5 * criterion.confidence),
+                gradient: gradient.clone(),
+            }));
         }
-        Some(worst)
+        // No relative accuracy of a value of zero.
+        demands.retain(|demand| demand.wanted > 0.0);
+        demands
+    }
+
+    fn needs(&self, all: &[f64], knowledge: &Knowledge, rate: f64) -> Vec<Need> {
+        let whole = self.covariance(all);
+        let parts: Vec<(f64, Option<Covariance>)> =
+            knowledge.growth.iter().map(|(until, sum)| (*until, self.covariance(sum))).collect();
+        self.demands()
+            .into_iter()
+            .map(|demand| {
+                let factor = |covariance: &Option<Covariance>| {
+                    let variance = covariance.as_ref()?.variance_of(&demand.gradient, &self.scale)?;
+                    Some(demand.quantile * demand.quantile * variance / (demand.wanted * demand.wanted))
+                };
+                let enough = parts.iter().find(|(_, covariance)| factor(covariance).is_some_and(|times| times <= 1.0));
+                let repetitions = factor(&whole);
+                Need {
+                    name: demand.name.clone(),
+                    unit: demand.unit.clone(),
+                    wanted: demand.shown,
+                    duration: enough.map(|(until, _)| *until),
+                    repetitions,
+                    rate: repetitions.map(|times| (times * rate).max(knowledge.useful_rate)),
+                }
+            })
+            .collect()
+    }
+
+    /// Names of the measures of a design, in the order of [`Planner::worth`].
+    fn measure_names(&self) -> Vec<String> {
+        let criteria = self.compiled.study.criteria.iter().take(self.criteria.len());
+        ["D".to_owned(), "A".to_owned()].into_iter().chain(criteria.map(|criterion| criterion.name.clone())).collect()
+    }
+
+    fn worth(&self, information: &[f64]) -> Worth {
+        let count = self.scale.len();
+        let nothing = || Worth { undetermined: count, measures: vec![None; 2 + self.criteria.len()] };
+        let Some(covariance) = self.covariance(information) else { return nothing() };
+        let Ok(decomposition) = SingularValueDecomposition::new(count, count, information) else { return nothing() };
+        let complete = covariance.undetermined.is_empty() && count > 0;
+        let mean_log =
+            decomposition.singular_values.iter().map(|value| 0.5 * value.ln()).sum::<f64>() / count.max(1) as f64;
+        let shares = (0..count).map(|j| covariance.matrix[j * count + j] / (self.scale[j] * self.scale[j]));
+        let mean = shares.sum::<f64>() / count.max(1) as f64;
+        let criteria = self.criteria.iter().zip(&self.compiled.study.criteria).map(|(gradient, criterion)| {
+            covariance.variance_of(gradient, &self.scale).map(|v| criterion.unit.difference_from_si(v.sqrt()))
+        });
+        Worth {
+            undetermined: covariance.undetermined.len(),
+            measures: [complete.then(|| (-mean_log).exp()), complete.then(|| mean.max(0.0).sqrt())]
+                .into_iter()
+                .chain(criteria)
+                .collect(),
+        }
+    }
+
+    fn combinations(&self, excitations: &[Excitation], offered: &[Vec<Vec<f64>>]) -> Vec<Combination> {
+        let names = self.measure_names();
+        let sensors = &self.compiled.study.measures;
+        let offer = Offer { before: &self.before, information: offered, worth: &|information| self.worth(information) };
+        let mut everything = self.before.clone();
+        offered.iter().flatten().for_each(|information| add(&mut everything, information));
+        let whole = self.worth(&everything);
+        let named = |measure: usize, chosen: Chosen| {
+            Some(Combination {
+                measure: names[measure].clone(),
+                excitations: chosen.choice.tests.iter().map(|&k| excitations[k].name.clone()).collect(),
+                sensors: chosen.choice.sensors.iter().map(|&k| sensors[k].name.clone()).collect(),
+                value: chosen.value,
+                with_everything: whole.measures[measure]?,
+                exact: chosen.exact,
+            })
+        };
+        let best = offer.best(names.len()).into_iter().enumerate();
+        best.flat_map(|(measure, found)| found.into_iter().map(move |chosen| (measure, chosen)))
+            .filter_map(|(measure, chosen)| named(measure, chosen))
+            .collect()
     }
 
     fn outcome(&self, information: &[f64]) -> Outcome {
@@ -387,23 +516,54 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Parameters that even all tests together hardly determine.
-    fn fix(&self, together: &Outcome) -> Vec<String> {
+    /// Parameters that even all tests together hardly determine, and what holding them would do for the others.
+    fn fix(&self, together: &Outcome, information: &[f64]) -> Vec<String> {
         let mut lines: Vec<String> = together
             .undetermined
             .iter()
             .map(|direction| format!("{direction}: give one of them a value, or measure it otherwise"))
             .collect();
-        for (parameter, declared) in together.parameters.iter().zip(&self.compiled.study.parameters) {
-            let Some(deviation) = parameter.standard_deviation else { continue };
+        for (j, declared) in self.compiled.study.parameters.iter().enumerate() {
+            let Some(deviation) = together.parameters[j].standard_deviation else { continue };
             let share = deviation / declared.unit.difference_from_si(declared.scale());
             if share > HARDLY_DETERMINED {
                 let percent = crate::quantities::format_number(100.0 * share, 2);
-                lines.push(format!("{}: its deviation would be {percent} % of its bounds", parameter.name));
+                let helped = self.helped(j, together, information).unwrap_or_default();
+                lines.push(format!("{}: its deviation would be {percent} % of its bounds{helped}", declared.name));
             }
         }
         lines
     }
+
+    /// The parameter that gains most when parameter `held` has a value.
+    fn helped(&self, held: usize, together: &Outcome, information: &[f64]) -> Option<String> {
+        let count = self.scale.len();
+        let mut known = information.to_vec();
+        let largest = (0..count).map(|j| information[j * count + j]).fold(1.0, f64::max);
+        known[held * count + held] += HELD * largest;
+        let covariance = self.covariance(&known)?;
+        let gain = |j: usize| {
+            let before = together.parameters[j].standard_deviation?;
+            let unit = &self.compiled.study.parameters[j].unit;
+            let after = unit.difference_from_si(covariance.standard_deviations[j]?);
+            (before > 0.0 && j != held).then_some((j, after / before))
+        };
+        let (j, ratio) = (0..count).filter_map(gain).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let percent = crate::quantities::format_number(100.0 * (1.0 - ratio), 2);
+        let name = &self.compiled.study.parameters[j].name;
+        (ratio < NOTABLY).then(|| format!("; with a value for it the deviation of {name} falls by {percent} %"))
+    }
+}
+
+/// Something whose accuracy is wanted: a linear function of the parameters.
+struct Demanded {
+    name: String,
+    unit: String,
+    /// Half-width of the interval, SI, and as shown.
+    wanted: f64,
+    shown: f64,
+    quantile: f64,
+    gradient: Vec<f64>,
 }
 
 fn best(excitations: &[Excitation]) -> Vec<Best> {
