@@ -112,7 +112,7 @@ fn page_of_a_quarter_vehicle() {
 #[test]
 fn page_of_a_fit_and_of_variants() {
     let answer = synthetic::quarter_vehicle();
-    let fit = page::identification(&answer.extended).unwrap();
+    let fit = page::identification(&answer.extended, None).unwrap();
     kept("fit.html", &fit);
     assert_sound(&fit);
     let mut third = answer.extended.clone();

@@ -23,8 +23,10 @@ pub struct Courses {
 #[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct Course {
     pub optimiser: String,
-    /// Best cost so far over the work: [simulations, cost].
+    /// Improvements of the best cost: [simulations until then, cost], both strictly monotonic.
     pub history: Vec<(usize, f64)>,
+    /// Simulations in all.
+    pub work: usize,
     pub cost: f64,
     /// The search ended by itself.
     pub converged: bool,
@@ -101,6 +103,7 @@ fn finished(optimiser: Optimiser, course: Search, best: f64) -> Course {
         converged: course.converged,
         work_to_best: reached.map(|(work, _)| *work),
         history: course.history,
+        work: course.work,
     }
 }
 
@@ -117,25 +120,50 @@ fn problem<'a>(
 fn gauss_newton<P: LeastSquares>(problem: &mut P, start: &[f64], bounds: &Bounds, budget: usize) -> Search {
     let columns = start.len();
     let work = |evaluations: usize, iterations: usize| evaluations + columns * (iterations + 1);
-    let mut history = Vec::new();
+    let mut found = Improvements::default();
     let outcome = levenberg_marquardt(problem, start, bounds, &Options::default(), &mut |progress| {
         let done = work(progress.evaluations, progress.iteration);
-        history.push((done, progress.cost));
+        found.note(done, progress.cost);
         if done >= budget { Control::Stop } else { Control::Continue }
     });
     match outcome {
         Ok(estimate) => {
-            history.insert(0, (work(1, 0), estimate.cost_history[0]));
-            let evaluations = estimate.residual_evaluations + estimate.gradient_evaluations;
-            history.push((work(evaluations, estimate.iterations), estimate.cost));
+            let done = work(estimate.residual_evaluations + estimate.gradient_evaluations, estimate.iterations);
+            let mut all = Improvements::default();
+            all.note(work(1, 0), estimate.cost_history[0]);
+            found.history.into_iter().for_each(|(work, cost)| all.note(work, cost));
+            all.note(done, estimate.cost);
             Search {
                 converged: estimate.stop_reason.converged(),
                 theta: estimate.theta,
-                cost: estimate.cost,
-                history,
+                // Costs of runs with and without gradient agree to the integration's accuracy: the best that was seen.
+                cost: all.history.last().map_or(estimate.cost, |(_, cost)| *cost),
+                history: all.history,
+                work: done,
                 stopped: false,
             }
         }
-        Err(_) => Search { theta: start.to_vec(), cost: f64::INFINITY, history, converged: false, stopped: false },
+        Err(_) => Search {
+            theta: start.to_vec(),
+            cost: f64::INFINITY,
+            history: found.history,
+            work: 0,
+            converged: false,
+            stopped: false,
+        },
+    }
+}
+
+/// The best cost so far wherever it fell.
+#[derive(Default)]
+struct Improvements {
+    history: Vec<(usize, f64)>,
+}
+
+impl Improvements {
+    fn note(&mut self, work: usize, cost: f64) {
+        if self.history.last().is_none_or(|(before, best)| work > *before && cost < *best) {
+            self.history.push((work, cost));
+        }
     }
 }

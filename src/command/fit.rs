@@ -3,6 +3,7 @@
 use super::output::{answer, page};
 use super::session::Session;
 use super::{Failed, StudyArguments};
+use crate::analyse::{Cuts, cuts};
 use crate::fit::{Chosen, Control, Optimiser};
 use crate::identify::{Fitted, Profile, Settings, confidence, equation_error, fit, identification, profiles};
 use crate::report;
@@ -23,6 +24,9 @@ pub(super) struct Arguments {
     /// Profile likelihood of these parameters: their intervals without linearisation (`all` for all)
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     profile: Vec<String>,
+    /// Show on the page cuts of the cost along every parameter, at two tolerances and in two bands (as `ident cuts`)
+    #[arg(long, requires = "html")]
+    cuts: bool,
     /// Write what the fit knows about the parameters, for `--with` of another fit
     #[arg(long, value_name = "FILE")]
     save_result: Option<PathBuf>,
@@ -138,8 +142,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     }
     let mut result = identification(&fit.compiled, &fit.fitted, &fit.records.iter().collect::<Vec<_>>());
     result.profiles = profiles_of(&session, &fit, &arguments.profile)?;
-    page(arguments.html.as_deref(), || report::page::identification(&result))?;
+    let cuts = match arguments.cuts {
+        true => Some(cuts_of(&session, &fit)?),
+        false => None,
+    };
+    page(arguments.html.as_deref(), || report::page::identification(&result, cuts.as_ref()))?;
     answer(study.format, || report::terminal::identification(&result), || report::json::identification(&result))
+}
+
+/// Points per cut of the page.
+const CUT_POINTS: usize = 41;
+
+fn cuts_of(session: &Session, fit: &FittedVariant) -> Result<Cuts, Failed> {
+    let estimation: Vec<&Record> = fit.records.iter().filter(|record| record.role == Role::Estimation).collect();
+    cuts(&fit.compiled, &fit.fitted, &estimation, CUT_POINTS, 1.0).map_err(|diagnostic| session.fail(&[diagnostic]))
 }
 
 /// Profiles of the named parameters.

@@ -37,8 +37,11 @@ impl Optimiser {
 pub struct Search {
     pub theta: Vec<f64>,
     pub cost: f64,
-    /// Best cost so far over the work done: (evaluations, cost). A gradient counts as many evaluations as it has columns.
+    /// Improvements of the best cost over the work done until then: (evaluations, cost), both strictly monotonic. A gradient counts
+    /// as many evaluations as it has columns.
     pub history: Vec<(usize, f64)>,
+    /// Evaluations in all.
+    pub work: usize,
     /// The search ended by itself, not by its budget.
     pub converged: bool,
     /// The observer wished its end.
@@ -130,9 +133,15 @@ impl<'a, P: LeastSquares + ?Sized> Counted<'a, P> {
         if self.best.0.is_empty() {
             self.best.0 = start.to_vec();
         }
-        self.history.push((self.work, self.best.1));
         let converged = converged && !self.stopped;
-        Search { theta: self.best.0, cost: self.best.1, history: self.history, converged, stopped: self.stopped }
+        Search {
+            theta: self.best.0,
+            cost: self.best.1,
+            history: self.history,
+            work: self.work,
+            converged,
+            stopped: self.stopped,
+        }
     }
 }
 

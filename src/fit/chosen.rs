@@ -41,7 +41,6 @@ pub fn minimise<P: LeastSquares, C: Constraints>(
     let found = observed_search(chosen, &mut admitted, start, bounds, observer);
     let (residual, gradient) = admitted.problem.residual_and_gradient(&found.theta).map_err(FitError::StartFails)?;
     let cost = residual.iter().map(|value| value * value).sum();
-    let evaluations = found.history.last().map_or(0, |(work, _)| *work);
     let state = |j: usize| match found.theta[j] {
         value if value <= bounds.lower[j] => BoundState::AtLower,
         value if value >= bounds.upper[j] => BoundState::AtUpper,
@@ -60,7 +59,7 @@ pub fn minimise<P: LeastSquares, C: Constraints>(
             (false, false) => StopReason::EvaluationLimit,
         },
         iterations: found.history.len(),
-        residual_evaluations: evaluations,
+        residual_evaluations: found.work,
         gradient_evaluations: 1,
         failed_evaluations: 0,
         last_failure: None,

@@ -1,6 +1,6 @@
 //! Pictures of the cost: over the work of optimisers, and along parameters.
 
-use crate::analyse::{Courses, CutCurve, Cuts, Descent, Descents};
+use crate::analyse::{Courses, Cut, CutCurve, Cuts, Descent, Descents};
 use crate::report::chart::{Axis, Mark, Plot, Style, escape};
 use crate::report::figure::framed;
 
@@ -8,6 +8,8 @@ const WIDTH: f64 = 900.0;
 const COURSES_HEIGHT: f64 = 430.0;
 /// Of one diagram of a cut, two beside each other.
 const CUT: (f64, f64) = (450.0, 260.0);
+/// Of one on a page.
+const TILE: (f64, f64) = (420.0, 260.0);
 const TOP: f64 = 40.0;
 
 /// Best cost so far (logarithm, relative to the start's) over simulations.
@@ -25,6 +27,10 @@ pub fn courses(courses: &Courses) -> String {
             }
             x.push(*work as f64);
             y.push((cost / first).log10());
+        }
+        if let Some(&last) = y.last() {
+            x.push(course.work as f64);
+            y.push(last);
         }
         marks.push(Mark::Line { x: x.into(), y: y.into(), style: Style::Variant(index), name: &course.optimiser });
     }
@@ -81,34 +87,59 @@ pub fn descents(descents: &Descents) -> String {
 pub fn cuts(cuts: &Cuts) -> String {
     let mut content = String::new();
     for (index, cut) in cuts.parameters.iter().enumerate() {
-        let name = |curve: &CutCurve| {
-            let band = curve.band.strip_prefix("up to ").unwrap_or("all");
-            format!("{band} {:.0e}", curve.tolerance)
-        };
-        let names: Vec<String> = cut.curves.iter().map(name).collect();
-        let marks = cut
-            .curves
-            .iter()
-            .zip(&names)
-            .enumerate()
-            .map(|(k, (curve, name))| {
-                let (x, y) = (cut.values.as_slice().into(), curve.discrepancy.as_slice().into());
-                Mark::Line { x, y, style: Style::Variant(k), name }
-            })
-            .collect();
-        let plot = Plot {
-            width: CUT.0,
-            height: CUT.1,
-            x_label: format!("{} [{}]", cut.parameter, cut.unit),
-            y_label: "discrepancy [%]".to_owned(),
-            marks,
-            legend: true,
-            x_axis: Axis::around(&cut.values, 0.0, 6),
-            y_axis: None,
-        };
         let (x, y) = ((index % 2) as f64 * CUT.0, TOP + (index / 2) as f64 * CUT.1);
-        content.push_str(&format!("<g transform=\"translate({x} {y})\">{}</g>", plot.group()));
+        let picture = cut_plot(cut, CUT, &|plot| plot.group());
+        content.push_str(&format!("<g transform=\"translate({x} {y})\">{picture}</g>"));
     }
     let height = TOP + cuts.parameters.len().div_ceil(2) as f64 * CUT.1;
     framed(WIDTH, height, &format!("Cuts of the cost of {}", escape(&cuts.study)), &content)
+}
+
+/// One parameter's cut as a picture of its own, for a page.
+pub(super) fn cut_svg(cut: &Cut) -> String {
+    cut_plot(cut, TILE, &|plot| plot.svg())
+}
+
+fn cut_plot(cut: &Cut, (width, height): (f64, f64), drawn: &dyn Fn(&Plot) -> String) -> String {
+    let name = |curve: &CutCurve| {
+        let band = curve.band.strip_prefix("up to ").unwrap_or("all");
+        format!("{band} {:.0e}", curve.tolerance)
+    };
+    let names: Vec<String> = cut.curves.iter().map(name).collect();
+    let mut marks: Vec<Mark> = cut
+        .curves
+        .iter()
+        .zip(&names)
+        .enumerate()
+        .map(|(k, (curve, name))| {
+            let (x, y) = (cut.values.as_slice().into(), curve.discrepancy.as_slice().into());
+            Mark::Line { x, y, style: Style::Variant(k), name }
+        })
+        .collect();
+    let at_estimate = cut.curves.first().and_then(|curve| nearest(&cut.values, &curve.discrepancy, cut.at));
+    marks.extend(at_estimate.map(|(x, y)| Mark::Circles {
+        x: vec![x].into(),
+        y: vec![y].into(),
+        style: Style::Measured,
+        name: "",
+    }));
+    let plot = Plot {
+        width,
+        height,
+        x_label: format!("{} [{}]", cut.parameter, cut.unit),
+        y_label: "discrepancy [%]".to_owned(),
+        marks,
+        legend: true,
+        x_axis: Axis::around(&cut.values, 0.0, 6),
+        y_axis: None,
+    };
+    drawn(&plot)
+}
+
+/// The curve at `at`, between its neighbours.
+fn nearest(values: &[f64], curve: &[f64], at: f64) -> Option<(f64, f64)> {
+    let k = values.windows(2).position(|pair| (pair[0]..=pair[1]).contains(&at))?;
+    let share = if values[k + 1] > values[k] { (at - values[k]) / (values[k + 1] - values[k]) } else { 0.0 };
+    let y = curve[k] + share * (curve[k + 1] - curve[k]);
+    y.is_finite().then_some((at, y))
 }

@@ -18,7 +18,7 @@ mod view;
 pub(crate) use missing::{ordered as places, over_rate as missing_over_rate};
 pub use template::RenderError;
 
-use crate::analyse::{Plan, Validity};
+use crate::analyse::{Cuts, Plan, Validity};
 use crate::diagnose::Answer;
 use crate::identify::Identification;
 
@@ -30,12 +30,12 @@ pub fn answer(answer: &Answer) -> Result<String, RenderError> {
     template::render("answer.html", &view::answer(answer), &histories::data(&view::answer_curves(answer)))
 }
 
-/// The result of a fit as a page.
+/// The result of a fit as a page, with cuts of its cost where they were asked for.
 ///
 /// # Errors
 /// As [`answer`].
-pub fn identification(fit: &Identification) -> Result<String, RenderError> {
-    template::render("fit.html", &view::identification(fit), &histories::data(&view::fit_curves(fit)))
+pub fn identification(fit: &Identification, cuts: Option<&Cuts>) -> Result<String, RenderError> {
+    template::render("fit.html", &view::identification(fit, cuts), &histories::data(&view::fit_curves(fit)))
 }
 
 /// Variants side by side as a page; the first one is the base.

@@ -7,10 +7,11 @@ use super::histories::{self, Curve, RecordView};
 use super::missing::{self, MissingView};
 use super::parameters::{self, ParameterRow};
 use super::ranking::{self, RoundView};
+use crate::analyse::Cuts;
 use crate::diagnose::{Answer, Verdict};
 use crate::identify::Identification;
 use crate::report::chart::Style;
-use crate::report::{number, words};
+use crate::report::{number, surface, words};
 use serde::Serialize;
 
 #[derive(Serialize)]
@@ -83,6 +84,8 @@ pub struct FitPage {
     remarks: Vec<String>,
     certainty: Option<CertaintyView>,
     error: Vec<String>,
+    /// One picture per parameter.
+    cuts: Vec<String>,
     #[serde(flatten)]
     fits: FitsView,
 }
@@ -142,13 +145,14 @@ pub fn answer(answer: &Answer) -> AnswerView {
     }
 }
 
-pub fn identification(fit: &Identification) -> FitPage {
+pub fn identification(fit: &Identification, cuts: Option<&Cuts>) -> FitPage {
     FitPage {
         title: format!("Fit of variant {}", fit.variant),
         figures: discrepancy_figures(fit, None),
         remarks: fit.remarks.clone(),
         certainty: certainty::view(fit),
         error: error_lines(fit),
+        cuts: cuts.map_or_else(Vec::new, |cuts| cuts.parameters.iter().map(surface::cut_svg).collect()),
         fits: fits(&fit_curves(fit)),
     }
 }

@@ -22,7 +22,7 @@ pub fn courses(courses: &Courses, colour: Colour) -> String {
             course.optimiser.clone(),
             number::significant(course.cost, 5),
             course.work_to_best.map_or("never".into(), |work| work.to_string()),
-            course.history.last().map_or(String::new(), |(work, _)| work.to_string()),
+            course.work.to_string(),
             if course.converged { String::new() } else { "stopped by the budget".into() },
         ]);
     }
