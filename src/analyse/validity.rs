@@ -210,7 +210,7 @@ impl Judge<'_> {
         let mut result = frame(self.compiled, criterion);
         let unit = &criterion.unit;
         result.value = Some(unit.from_si(value));
-        let factor = student_quantile(0.5 + 0.5 * criterion.confidence, self.confidence.freedom());
+        let factor = student_quantile(0.5 + 0.5 * criterion.confidence, self.confidence.freedom_along(gradient));
         let symmetric = |deviation: f64| Spread {
             standard_deviation: unit.difference_from_si(deviation),
             interval: (unit.from_si(value - factor * deviation), unit.from_si(value + factor * deviation)),

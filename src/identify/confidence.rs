@@ -1,6 +1,7 @@
 //! Covariance of the estimate from its gradient and the autocorrelation of its residual (method 7).
 
 use super::fitting::Fitted;
+use super::freedom::Spread;
 use super::knowledge::straightened;
 use super::noise;
 use crate::signal::effective_count;
@@ -38,6 +39,8 @@ pub struct Confidence {
     pub noise_orders: Vec<usize>,
     standard_deviations: Vec<Option<f64>>,
     estimate: Vec<f64>,
+    /// How well the covariance is known.
+    spread: Spread,
 }
 
 impl Confidence {
@@ -48,12 +51,24 @@ impl Confidence {
 
     /// 95 % interval; `None` where the data leave the parameter undetermined.
     pub fn interval(&self, index: usize) -> Option<(f64, f64)> {
-        Some(confidence_interval(self.estimate[index], self.standard_deviation(index)?, self.freedom(), LEVEL))
+        Some(confidence_interval(self.estimate[index], self.standard_deviation(index)?, self.freedom_of(index), LEVEL))
     }
 
-    /// Degrees of freedom of the noise estimate behind the intervals.
+    /// Smallest degrees of freedom of the noise estimate behind any parameter's interval.
     pub fn freedom(&self) -> f64 {
-        (self.effective_count - self.estimate.len() as f64).max(1.0)
+        let all = (0..self.estimate.len()).map(|index| self.freedom_of(index)).fold(f64::INFINITY, f64::min);
+        if all.is_finite() { all } else { (self.effective_count - self.estimate.len() as f64).max(1.0) }
+    }
+
+    /// Degrees of freedom of the noise estimate behind a parameter's interval; infinite where it is undetermined.
+    pub fn freedom_of(&self, index: usize) -> f64 {
+        let unit: Vec<f64> = (0..self.estimate.len()).map(|j| if j == index { 1.0 } else { 0.0 }).collect();
+        self.freedom_along(&unit)
+    }
+
+    /// The same for a linear function of the parameters with this gradient.
+    pub fn freedom_along(&self, gradient: &[f64]) -> f64 {
+        self.spread.freedom(&self.covariance, gradient)
     }
 }
 
@@ -89,6 +104,7 @@ pub fn confidence(compiled: &Compiled, fitted: &Fitted) -> Confidence {
     let mut completed = models;
     noise::complete(fitted, &mut completed, &inverse);
     let gamma = noise::gamma(fitted, &gradient, &completed, &inverse);
+    confidence.spread = Spread::new(fitted, &completed, &inverse);
     if let Ok(analysis) = identifiability(&gradient, &scales, &fitted.theta, &names, RANK_THRESHOLD) {
         confidence.undetermined = analysis.undetermined.iter().map(|direction| direction.description.clone()).collect();
         confidence.identifiability = analysis.measures;

@@ -13,10 +13,17 @@ use crate::study::ErrorDefinition;
 /// Stretches per record unless the user says otherwise.
 const STRETCHES: usize = 12;
 
-fn refused(what: &str, why: &str) -> Diagnostic {
-    Diagnostic::error(Code::FIT_FAILED, format!("{what} does not fit this study: {why}"))
-        .help("use the output error (`--error output`)")
+/// `instead`: what answers the question that this definition of the error was asked for.
+fn refused(what: &str, why: &str, instead: &str) -> Diagnostic {
+    Diagnostic::error(Code::FIT_FAILED, format!("{what} does not fit this study: {why}")).help(instead)
 }
+
+/// Process noise colours the residual of a free simulation.
+const WITHOUT_FILTER: &str =
+    "use the output error and weight by the colour that process noise gives it (`--error output --noise coloured`)";
+/// Against minima of a cost that a record's length makes.
+const WITHOUT_SHOOTING: &str =
+    "use the output error from several starts, the low frequencies first (`--error output --starts 10 --bands 3`)";
 
 /// One linear step (or a few), and the output error there for weights and discrepancy.
 pub(super) fn equation(compiled: &Compiled, records: &[&Record], settings: &Settings) -> Result<Fitted, Diagnostic> {
@@ -69,10 +76,12 @@ pub(super) fn filter(
 ) -> Result<Fitted, Diagnostic> {
     const WHAT: &str = "the filter error";
     if let Some(why) = stretches_refused(compiled) {
-        return Err(refused(WHAT, why));
+        return Err(refused(WHAT, why, WITHOUT_FILTER));
     }
     if compiled.study.filter.is_some() || compiled.study.remove_mean {
-        return Err(refused(WHAT, "a prefilter would colour the innovations that the estimator weighs"));
+        let why = "its weights hold for innovations that are white, and a prefilter or a removed mean colours them";
+        let instead = "leave `filter` out: the estimator follows what the model does not explain, slow or fast; or use `--error output`";
+        return Err(refused(WHAT, why, instead));
     }
     let start = settings.start.clone().unwrap_or_else(|| start_values(compiled));
     let mut rows = prior_rows(&compiled.study);
@@ -83,7 +92,7 @@ pub(super) fn filter(
         records,
         &start,
         &mut |problem, start| search_once(compiled, problem, start, settings, &rows, observer),
-        &|why| refused(WHAT, &why),
+        &|why| refused(WHAT, &why, WITHOUT_FILTER),
     )?;
     history.clone_from(&estimate.cost_history);
     let measures = &compiled.study.measures;
@@ -117,12 +126,13 @@ pub(super) fn shooting_start(
 ) -> Result<Joined, Diagnostic> {
     const WHAT: &str = "multiple shooting";
     if let Some(why) = stretches_refused(compiled) {
-        return Err(refused(WHAT, why));
+        return Err(refused(WHAT, why, WITHOUT_SHOOTING));
     }
     let start = settings.start.clone().unwrap_or_else(|| start_values(compiled));
     let filters = prefilters(compiled, records)?;
     let weighting = first_weights(&compiled.study, records, &filters);
     let problem = Problem::new(compiled, records.to_vec(), filters, weighting.weights);
     let count = if settings.stretches == 0 { STRETCHES } else { settings.stretches };
-    shooting(&problem, &bounds(&compiled.study), &start, count, observer).map_err(|why| refused(WHAT, &why))
+    shooting(&problem, &bounds(&compiled.study), &start, count, observer)
+        .map_err(|why| refused(WHAT, &why, WITHOUT_SHOOTING))
 }

@@ -15,7 +15,7 @@ use crate::fit::{
     Bounds, Chosen, Control, Estimate, FitError, LeastSquares, Options, PriorRow, Progress, StopReason, WithPriors,
     parallel_starts,
 };
-use crate::signal::Prefilter;
+use crate::signal::{AutoRegression, Prefilter};
 use crate::simulation::{Compiled, Record};
 use crate::study::{ErrorDefinition, Parameter, Study};
 use rayon::prelude::*;
@@ -96,8 +96,8 @@ pub struct Fitted {
     pub process_noise: Vec<(String, f64)>,
     /// Noise levels per measure (SI) where the fit found them itself: filter error, pre-whitening.
     pub noise_levels: Option<Vec<Option<f64>>>,
-    /// Order of the noise model by which each block was weighted; empty where none was.
-    pub whitening_orders: Vec<usize>,
+    /// Noise model by which each block was weighted; empty where none was.
+    pub whitening: Vec<Option<AutoRegression>>,
     /// Bands that were fitted before the study's own: (stop edge in Hz, discrepancy in %).
     pub bands: Vec<(f64, f64)>,
 }
@@ -362,7 +362,7 @@ pub(super) fn finish(
         gap: None,
         process_noise: Vec::new(),
         noise_levels: None,
-        whitening_orders: Vec::new(),
+        whitening: Vec::new(),
         bands: Vec::new(),
     }
 }

@@ -10,6 +10,7 @@ mod constraints;
 mod definitions;
 mod errors;
 mod fitting;
+mod freedom;
 mod knowledge;
 mod noise;
 mod problem;

@@ -19,9 +19,9 @@ const FILTER_ORDER: usize = 16;
 /// is estimated.
 #[derive(Clone, Debug)]
 pub(super) struct NoiseModel {
-    stride: usize,
+    pub stride: usize,
     filter: AutoRegression,
-    model: AutoRegression,
+    pub model: AutoRegression,
     /// The share of the fitted parameters is given back, lag by lag.
     complete: bool,
 }
@@ -89,7 +89,7 @@ fn stride(fitted: &Fitted, record: usize) -> usize {
     (fitted.rates[record] / (2.0 * band_end)).floor().max(1.0) as usize
 }
 
-fn every(values: &[f64], phase: usize, stride: usize) -> Vec<f64> {
+pub(super) fn every(values: &[f64], phase: usize, stride: usize) -> Vec<f64> {
     values.iter().skip(phase).step_by(stride).copied().collect()
 }
 
@@ -151,6 +151,8 @@ pub(super) fn inflation(compiled: &Compiled, fitted: &Fitted, threshold: f64) ->
 
 /// Longest lag of the models' autocovariance that the completion takes into account.
 const LONGEST: usize = 400;
+/// Rounds of the completion: each time the share is a share of the noise as completed before.
+const COMPLETIONS: usize = 3;
 
 /// Gives the models back what the fitted parameters have taken of the noise (method 4.5 lag by lag): it is missing at the very
 /// frequencies at which the parameters are determined, where an average share would be too little. With the residual
@@ -161,6 +163,22 @@ pub(super) fn complete(fitted: &Fitted, models: &mut [NoiseModel], inverse: &[f6
     if fitted.blocks.iter().any(|block| filtered(block.record)) {
         return;
     }
+    let seen: Vec<Vec<f64>> = models.iter().map(|noise| autocovariance(&noise.model)).collect();
+    for _ in 0..COMPLETIONS {
+        let taken = taken(fitted, models, inverse);
+        for ((noise, seen), taken) in models.iter_mut().zip(&seen).zip(taken) {
+            let completed: Vec<f64> =
+                taken.iter().enumerate().map(|(lag, own)| seen.get(lag).copied().unwrap_or(0.0) + own).collect();
+            let model = AutoRegression::from_autocovariance(&completed);
+            if model.order() + 1 == completed.len() && model.variance > 0.0 {
+                (noise.model, noise.complete) = (model, true);
+            }
+        }
+    }
+}
+
+/// Per block, at the lags up to the model's order: what the residual's autocovariance lacks of the noise's if that is as the models say.
+fn taken(fitted: &Fitted, models: &[NoiseModel], inverse: &[f64]) -> Vec<Vec<f64>> {
     let (count, rows) = (fitted.theta.len(), fitted.residual.len());
     let column =
         |j: usize, range: &std::ops::Range<usize>| &fitted.gradient[j * rows + range.start..j * rows + range.end];
@@ -180,41 +198,38 @@ pub(super) fn complete(fitted: &Fitted, models: &mut [NoiseModel], inverse: &[f6
             }
         }
     }
-    for (((block, own), covariance), noise) in
-        fitted.blocks.iter().zip(&shaped).zip(&covariances).zip(models.iter_mut())
-    {
-        let order = noise.model.order();
-        let length = block.rows.len();
-        let phi: Vec<&[f64]> = (0..count).map(|j| column(j, &block.rows)).collect();
-        // u = Phi Xi^+ - as columns; then P R = u (R Phi)^T, and P R P = u Gamma u^T.
-        let mixed = |columns: &[&[f64]], matrix: &[f64]| -> Vec<Vec<f64>> {
-            (0..count)
-                .map(|j| {
-                    let mut sum = vec![0.0; length];
-                    for (i, own) in columns.iter().enumerate() {
-                        let factor = matrix[j * count + i];
-                        sum.iter_mut().zip(*own).for_each(|(value, entry)| *value += factor * entry);
-                    }
-                    sum
+    let blocks = fitted.blocks.iter().zip(&shaped).zip(models);
+    blocks
+        .map(|((block, own), noise)| {
+            let length = block.rows.len();
+            let phi: Vec<Vec<f64>> = (0..count).map(|j| column(j, &block.rows).to_vec()).collect();
+            // u = Phi Xi^+ - as columns; then P R = u (R Phi)^T, and P R P = u Gamma u^T.
+            let u = combined(&phi, inverse);
+            let through = combined(&u, &gamma);
+            (0..=noise.model.order())
+                .map(|lag| {
+                    let along = |a: &[f64], b: &[f64]| a.iter().zip(&b[lag..]).map(|(x, y)| x * y).sum::<f64>();
+                    let own = |j: usize| along(&u[j], &own[j]) + along(&own[j], &u[j]) - along(&through[j], &u[j]);
+                    (0..count).map(own).sum::<f64>() / (length - lag).max(1) as f64
                 })
                 .collect()
-        };
-        let u = mixed(&phi, inverse);
-        let views: Vec<&[f64]> = u.iter().map(Vec::as_slice).collect();
-        let through = mixed(&views, &gamma);
-        let completed: Vec<f64> = (0..=order)
-            .map(|lag| {
-                let along = |a: &[f64], b: &[f64]| a.iter().zip(&b[lag..]).map(|(x, y)| x * y).sum::<f64>();
-                let taken: f64 =
-                    (0..count).map(|j| along(&u[j], &own[j]) + along(&own[j], &u[j]) - along(&through[j], &u[j])).sum();
-                covariance.get(lag).copied().unwrap_or(0.0) + taken / (length - lag).max(1) as f64
-            })
-            .collect();
-        let model = AutoRegression::from_autocovariance(&completed);
-        if model.order() == order && model.variance > 0.0 {
-            (noise.model, noise.complete) = (model, true);
-        }
-    }
+        })
+        .collect()
+}
+
+/// Columns times a p x p matrix.
+pub(super) fn combined(columns: &[Vec<f64>], matrix: &[f64]) -> Vec<Vec<f64>> {
+    let (count, length) = (columns.len(), columns.first().map_or(0, Vec::len));
+    (0..count)
+        .map(|j| {
+            let mut sum = vec![0.0; length];
+            for (i, own) in columns.iter().enumerate() {
+                let factor = matrix[j * count + i];
+                sum.iter_mut().zip(own).for_each(|(value, entry)| *value += factor * entry);
+            }
+            sum
+        })
+        .collect()
 }
 
 /// Of the process, up to the lag where it has decayed.
@@ -291,7 +306,9 @@ pub(super) fn deviations(
     let mut deviations = vec![None; measures];
     if let Ok(variances) = noise_variances(&channels, scales, prior, threshold, &filter) {
         for (&measure, variance) in numbers.iter().zip(variances) {
-            deviations[measure] = Some(variance.sqrt()).filter(|deviation| deviation.is_finite());
+            // A channel that stands still between two steps shows less than its rounding does.
+            let rounding = compiled.study.measures[measure].rounding();
+            deviations[measure] = Some(variance.sqrt().max(rounding)).filter(|deviation| deviation.is_finite());
         }
     }
     deviations

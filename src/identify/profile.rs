@@ -1,12 +1,14 @@
 //! Profile likelihood: the cost along a parameter while all others follow (Venzon-Moolgavkar-1988).
 
 use super::confidence::Confidence;
+use super::errors::frozen_filter;
 use super::fitting::{Fitted, bounds, prefilters};
 use super::problem::Problem;
 use crate::diagnostics::{Code, Diagnostic};
-use crate::fit::{Bounds, Control, Options, WithPriors, levenberg_marquardt};
+use crate::fit::{Bounds, Control, LeastSquares, Options, WithPriors, levenberg_marquardt};
 use crate::simulation::{Compiled, Record};
 use crate::statistics::student_quantile;
+use crate::study::ErrorDefinition;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -36,10 +38,10 @@ pub struct Profile {
     pub upper: Option<f64>,
 }
 
-/// Profiles of the parameters with these indices.
+/// Profiles of the parameters with these indices, under the weights of the fit: its noise models, or the gains of its state estimator.
 ///
 /// # Errors
-/// A filter that cannot be designed for a record; a parameter that cannot be moved at all.
+/// A filter that cannot be designed for a record; a parameter that cannot be moved at all; the equation error, which has no likelihood.
 pub fn profiles(
     compiled: &Compiled,
     fitted: &Fitted,
@@ -47,24 +49,49 @@ pub fn profiles(
     records: &[&Record],
     indices: &[usize],
 ) -> Result<Vec<Profile>, Diagnostic> {
-    let filters = prefilters(compiled, records)?;
-    let problem = Problem::new(compiled, records.to_vec(), filters, fitted.weighting.weights.clone());
-    let outcomes: Vec<Result<Profile, Diagnostic>> =
-        indices.par_iter().map(|&index| profile(compiled, fitted, confidence, &problem, index)).collect();
-    outcomes.into_iter().collect()
+    let failed = |why: String| Diagnostic::error(Code::FIT_FAILED, format!("no profile of the parameters: {why}"));
+    match fitted.error {
+        _ if indices.is_empty() => Ok(Vec::new()),
+        ErrorDefinition::Equation => {
+            Err(failed("noise in the states biases the equation error by an unknown amount".to_owned())
+                .help("profile the output error, from there: `--start equation` instead of `--error equation`"))
+        }
+        ErrorDefinition::Filter => {
+            let problem = frozen_filter(compiled, records, fitted).map_err(failed)?;
+            along_all(compiled, fitted, confidence, &problem, indices)
+        }
+        ErrorDefinition::Output | ErrorDefinition::Shooting => {
+            let filters = prefilters(compiled, records)?;
+            let mut problem = Problem::new(compiled, records.to_vec(), filters, fitted.weighting.weights.clone());
+            problem.whitening.clone_from(&fitted.whitening);
+            along_all(compiled, fitted, confidence, &problem, indices)
+        }
+    }
 }
 
-fn profile(
+fn along_all<P: LeastSquares + Clone + Sync>(
     compiled: &Compiled,
     fitted: &Fitted,
     confidence: &Confidence,
-    problem: &Problem,
+    problem: &P,
+    indices: &[usize],
+) -> Result<Vec<Profile>, Diagnostic> {
+    let outcomes: Vec<Result<Profile, Diagnostic>> =
+        indices.par_iter().map(|&index| profile(compiled, fitted, confidence, problem, index)).collect();
+    outcomes.into_iter().collect()
+}
+
+fn profile<P: LeastSquares + Clone>(
+    compiled: &Compiled,
+    fitted: &Fitted,
+    confidence: &Confidence,
+    problem: &P,
     index: usize,
 ) -> Result<Profile, Diagnostic> {
     let parameter = &compiled.study.parameters[index];
     let deviation = confidence.standard_deviation(index).filter(|deviation| *deviation > 0.0);
     let step = deviation.map_or(OPEN_DISTANCE * parameter.scale(), |deviation| DISTANCE * deviation);
-    let limit = student_quantile(0.975, confidence.freedom()).powi(2);
+    let limit = student_quantile(0.975, confidence.freedom_of(index)).powi(2);
     let unit = deviation.map_or(1.0, |deviation| deviation * deviation * curvature(fitted, index));
     let best = refit(compiled, fitted, problem, index, fitted.theta[index], &fitted.theta)?;
     let mut points = vec![(fitted.theta[index], 0.0)];
@@ -108,10 +135,10 @@ fn profile(
 }
 
 /// Parameters and cost (priors included) with parameter `index` held at `value`.
-fn refit(
+fn refit<P: LeastSquares + Clone>(
     compiled: &Compiled,
     fitted: &Fitted,
-    problem: &Problem,
+    problem: &P,
     index: usize,
     value: f64,
     start: &[f64],

@@ -6,6 +6,7 @@ use super::errors::error_report;
 use super::fitting::{Fitted, prefilters};
 use super::problem::Problem;
 use super::{ChannelFit, DiscrepancyNode, Identification, ParameterEstimate, RecordFit};
+use crate::signal::AutoRegression;
 use crate::simulation::{Compiled, Record, Trajectory, certify};
 use crate::study::{ErrorDefinition, Group, Role};
 
@@ -158,15 +159,22 @@ fn way_remarks(compiled: &Compiled, fitted: &Fitted, confidence: &Confidence) ->
         })
         .collect();
     let channel = |index: usize| compiled.study.measures[fitted.blocks[index].measure].name.as_str();
-    for (index, order) in fitted.whitening_orders.iter().enumerate().filter(|(_, order)| **order > 0) {
-        remarks.push(format!(
-            "noise of {} modelled as autoregressive of order {order}, and weighted by it",
-            channel(index)
-        ));
+    for (index, model) in fitted.whitening.iter().enumerate() {
+        if let Some(order) = model.as_ref().map(AutoRegression::order).filter(|order| *order > 0) {
+            let name = channel(index);
+            remarks.push(format!("noise of {name} modelled as autoregressive of order {order}, and weighted by it"));
+        }
     }
+    remarks.extend(fitted.gap.filter(|gap| *gap > OPEN_GAP).map(|gap| {
+        format!(
+            "the stretches could not be joined: gaps of up to {:.1} % of a state's course were left; the output error went on from there",
+            100.0 * gap
+        )
+    }));
+    remarks.extend(rounding_remarks(compiled, fitted, confidence));
     let coloured = confidence.noise_orders.iter().enumerate().filter(|(_, order)| **order > 0);
     let coloured: Vec<&str> = coloured.map(|(index, _)| channel(index)).collect();
-    if fitted.whitening_orders.is_empty() && fitted.error != ErrorDefinition::Equation && !coloured.is_empty() {
+    if fitted.whitening.is_empty() && fitted.error != ErrorDefinition::Equation && !coloured.is_empty() {
         remarks.push(format!(
             "coloured residual in {}: the intervals know of it; `--noise coloured` weights by it, too",
             coloured.join(", ")
@@ -174,6 +182,37 @@ fn way_remarks(compiled: &Compiled, fitted: &Fitted, confidence: &Confidence) ->
     }
     remarks
 }
+
+/// What sensors that round contribute to the noise, and where that is no noise any more.
+fn rounding_remarks(compiled: &Compiled, fitted: &Fitted, confidence: &Confidence) -> Vec<String> {
+    let compared = |measure: usize| fitted.blocks.iter().any(|block| block.measure == measure);
+    let measures = compiled.study.measures.iter().enumerate().filter(|(index, _)| compared(*index));
+    measures
+        .filter_map(|(index, measure)| {
+            let step = measure.quantisation?;
+            let noise = measure.noise.or(confidence.noise.get(index).copied().flatten())?;
+            let share = (measure.rounding() / noise).powi(2);
+            let step = number(measure.unit.difference_from_si(step));
+            let advice = if share > MOSTLY_ROUNDING {
+                ": its errors follow the signal and repeat with it, intervals may be too narrow"
+            } else {
+                ""
+            };
+            Some(format!(
+                "{} rounds to {step} {}, {:.0} % of the variance of its noise{advice}",
+                measure.name,
+                measure.unit.symbol,
+                100.0 * share.min(1.0)
+            ))
+        })
+        .collect()
+}
+
+/// Gaps between stretches above this share of a state's course are told: they are closed below 1e-5.
+const OPEN_GAP: f64 = 1e-3;
+/// Rounding errors of a signal with less noise than a third of the step are no longer independent of it (Widrow-1961): the variance
+/// q^2 / 12 is then this share of all.
+const MOSTLY_ROUNDING: f64 = 0.43;
 
 fn number(value: f64) -> String {
     let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;

@@ -93,7 +93,8 @@ pub(super) fn residual_deviations(
             let share = count / own().map(|block| block.rows.len()).sum::<usize>().max(1) as f64;
             robust_deviation(rows.map(|value| original(study.solver.loss, *value))) / (share * free).sqrt()
         };
-        let deviation = declared.weight * spread / current.weights[measure];
+        // What a channel shows cannot be known better than it rounds, even where the model meets the rounded values.
+        let deviation = (declared.weight * spread / current.weights[measure]).max(declared.rounding());
         if deviation > 0.0 {
             next.weights[measure] = declared.weight / deviation;
             next.sources[measure] = RESIDUAL;

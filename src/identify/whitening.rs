@@ -1,11 +1,14 @@
 //! Pre-whitening: coloured noise modelled as autoregressive, the cost weighted by it, iterated to convergence.
 
+use super::confidence::RANK_THRESHOLD;
 use super::fitting::{Fitted, Settings, finish, search_once};
+use super::noise::combined;
 use super::problem::Problem;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::fit::{Control, LeastSquares, PriorRow, Progress, StopReason};
 use crate::signal::AutoRegression;
 use crate::simulation::Compiled;
+use crate::statistics::Covariance;
 use crate::study::Parameter;
 
 /// Largest order of a noise model.
@@ -33,15 +36,18 @@ pub(super) fn whitened(
     let mut residual = white.residual.clone();
     let mut theta = white.theta.clone();
     let mut iterations = white.iterations;
+    let mut taken = None;
     for round in 1.. {
-        let models: Vec<Option<AutoRegression>> = blocks
-            .iter()
-            .map(|block| {
-                let filtered = problem.prefilters[block.record].design().is_some();
-                (!filtered).then(|| AutoRegression::choose(&residual[block.rows.clone()], LARGEST_ORDER))
+        let models = blocks.iter().enumerate().map(|(index, block)| {
+            let filtered = problem.prefilters[block.record].design().is_some();
+            (!filtered).then(|| {
+                let seen = AutoRegression::choose(&residual[block.rows.clone()], LARGEST_ORDER);
+                let share =
+                    taken.as_ref().map(|information: &Vec<f64>| share(&white, index, information, seen.order()));
+                share.map_or_else(|| seen.clone(), |share| completed(&seen, &share))
             })
-            .collect();
-        problem.whitening = models;
+        });
+        problem.whitening = models.collect();
         let estimate = search_once(compiled, &mut problem, &theta, settings, &rows, observer)?;
         iterations += estimate.iterations;
         let moved = estimate.theta.iter().zip(&theta).zip(&scales).map(|((a, b), scale)| (a - b).abs() / scale);
@@ -51,17 +57,46 @@ pub(super) fn whitened(
             let mut fitted =
                 finish(estimate, white.weighting.clone(), &problem, white.cost_history.clone(), iterations);
             fitted.noise_levels = Some(levels(&problem, &white));
-            fitted.whitening_orders =
-                problem.whitening.iter().map(|model| model.as_ref().map_or(0, AutoRegression::order)).collect();
+            fitted.whitening = problem.whitening;
             (fitted.prior_rows, fitted.start_costs, fitted.bands) = (rows, white.start_costs, white.bands);
             return Ok(fitted);
         }
+        taken = inverse_information(&estimate.gradient, theta.len(), &scales);
         let models = std::mem::take(&mut problem.whitening);
         let failed = |explanation: String| Diagnostic::error(Code::FIT_FAILED, explanation);
         residual = problem.residual(&theta).map_err(|failure| failed(failure.explanation))?;
         problem.whitening = models;
     }
     Ok(white)
+}
+
+/// Xi^+ of a weighted gradient, p x p; `None` where it is not finite.
+fn inverse_information(gradient: &[f64], count: usize, scales: &[f64]) -> Option<Vec<f64>> {
+    (count > 0).then_some(())?;
+    Covariance::new(gradient, scales, 1.0, None, RANK_THRESHOLD).ok().map(|covariance| covariance.matrix)
+}
+
+/// What the residual's autocovariance lacks of the noise's at the lags 0 ..= `order`, because the fitted parameters have taken it:
+/// with weights that know the colour it is `Phi Xi^+ Phi^T`, on average along its diagonals. The gradient before the
+/// whitening is that of the first fit.
+fn share(white: &Fitted, block: usize, inverse: &[f64], order: usize) -> Vec<f64> {
+    let (rows, range) = (white.residual.len().max(1), white.blocks[block].rows.clone());
+    let phi: Vec<Vec<f64>> = white.gradient.chunks_exact(rows).map(|column| column[range.clone()].to_vec()).collect();
+    let u = combined(&phi, inverse);
+    let along = |lag: usize| {
+        let of = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(&b[lag..]).map(|(x, y)| x * y).sum::<f64>();
+        u.iter().zip(&phi).map(of).sum::<f64>() / (range.len() - lag).max(1) as f64
+    };
+    (0..=order).map(along).collect()
+}
+
+/// The model of the same order with the share given back.
+fn completed(seen: &AutoRegression, share: &[f64]) -> AutoRegression {
+    let impulse = seen.colour(&[1.0]);
+    let lag = |lag: usize| impulse.iter().zip(&impulse[lag..]).map(|(a, b)| a * b).sum::<f64>();
+    let whole: Vec<f64> = share.iter().enumerate().map(|(k, own)| lag(k) + own).collect();
+    let model = AutoRegression::from_autocovariance(&whole);
+    if model.order() == seen.order() && model.variance > 0.0 { model } else { seen.clone() }
 }
 
 /// Standard deviation of the noise per measure, SI: of the process that each model stands for.

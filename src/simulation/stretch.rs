@@ -49,9 +49,13 @@ pub fn stretches_refused(compiled: &Compiled) -> Option<&'static str> {
         return Some("a measure has a delay: what it shows is no function of the present state");
     }
     if compiled.model.state_count() < compiled.model.dimension() {
-        return Some("the mechanism has loops: its states cannot be moved one by one");
+        return Some(
+            "the mechanism has closed loops: its states depend on each other and cannot be moved or corrected one by one",
+        );
     }
-    (compiled.model.switch_count() > 0).then_some("laws switch: which mode they are in is no state that could be moved")
+    (compiled.model.switch_count() > 0).then_some(
+        "laws switch: which mode they are in follows from the past and is no state that could be moved or corrected",
+    )
 }
 
 impl<'a> Stretches<'a> {

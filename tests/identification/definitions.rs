@@ -2,7 +2,7 @@
 
 use crate::shipped::{compiled, loaded};
 use ident::fit::Control;
-use ident::identify::{Fitted, Settings, confidence, equation_error, fit};
+use ident::identify::{Fitted, Settings, confidence, equation_error, fit, profiles};
 use ident::simulation::{Compiled, Gradient, Record, prepare, simulate};
 use ident::statistics::NormalStream;
 use ident::study::{self, ErrorDefinition};
@@ -152,4 +152,33 @@ fn multiple_shooting_finds_what_single_shooting_misses() {
         let deviation = confidence.standard_deviation(j).expect("determined");
         assert!((multiple.theta[j] - truth).abs() < 4.0 * deviation, "{j}: {:?} {deviation}", multiple.theta);
     }
+}
+
+/// The shipped field test asks for the filter error by itself: numbers and road of the independent simulator are found, and profiles
+/// under the filter's weights end where the intervals do. A free simulation is soon out of step.
+#[test]
+fn the_field_test_needs_the_filter_error() {
+    let (compiled, records) = compiled(&loaded("caster_shimmy"));
+    let records: Vec<&Record> = records.iter().collect();
+    assert_eq!(compiled.study.solver.error, ErrorDefinition::Filter);
+    let with = |error: ErrorDefinition| {
+        let settings = Settings { error, ..Settings::default() };
+        fit(&compiled, &records, &settings, &mut |_| Control::Continue).expect("a fit")
+    };
+    let found = with(ErrorDefinition::Filter);
+    let known = confidence(&compiled, &found);
+    let profiles = profiles(&compiled, &found, &known, &records, &[0, 1]).expect("profiles");
+    for (j, truth) in [800.0, 6.0].into_iter().enumerate() {
+        let (low, high) = known.interval(j).expect("determined");
+        let deviation = known.standard_deviation(j).expect("determined");
+        assert!((found.theta[j] - truth).abs() < 3.0 * deviation, "{} +- {deviation} for {truth}", found.theta[j]);
+        assert!(high - low < 0.2 * truth, "{low} .. {high}");
+        let (lower, upper) = (profiles[j].lower.expect("an end"), profiles[j].upper.expect("an end"));
+        assert!(((upper - lower) / (high - low) - 1.0).abs() < 0.15, "{lower} .. {upper} instead of {low} .. {high}");
+    }
+    // 0.8 N m sqrt(s) on 0.5 kg m^2.
+    let (state, level) = &found.process_noise[0];
+    assert!(state == "pin.velocity" && (level / 1.6 - 1.0).abs() < 0.25, "{state}: {level}");
+    let output = with(ErrorDefinition::Output);
+    assert!(output.discrepancy() > 100.0 && (output.theta[1] / 6.0 - 1.0).abs() > 0.5, "{:?}", output.theta);
 }

@@ -5,6 +5,8 @@ mod coverage;
 mod definitions;
 mod nuisance;
 mod plan;
+#[path = "../support/repeated.rs"]
+mod repeated;
 mod shipped;
 mod structures;
 mod surface;

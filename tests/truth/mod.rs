@@ -14,6 +14,7 @@ pub mod mechanism;
 pub mod quarter_vehicle;
 pub mod random;
 pub mod record;
+pub mod shimmy;
 pub mod shipped;
 pub mod simulator;
 pub mod spring_slide;

@@ -42,5 +42,6 @@ pub fn records() -> Vec<Shipped> {
         let record = Record::measure(slide.as_ref(), &Effect::Nothing, seed, level);
         shipped.push(Shipped { study: "series_springs", file, record });
     }
+    shipped.push(Shipped { study: "caster_shimmy", file: "estimation.csv", record: super::shimmy::towing(7) });
     shipped
 }

@@ -3,6 +3,7 @@
 //! Gains and weights are frozen while the parameters move, then renewed with the noise levels of largest likelihood, until
 //! neither changes: at the end the innovations are white and the weights their inverse deviations.
 
+use super::super::fitting::Fitted;
 use super::kalman::{NoiseLevels, Pass, pass};
 use super::process::{estimate, first_levels};
 use crate::diagnostics::Diagnostic;
@@ -25,6 +26,7 @@ type Rows = (Vec<f64>, Vec<f64>);
 type Search<'a> = dyn FnMut(&mut FilterProblem, &[f64]) -> Result<Estimate, Diagnostic> + 'a;
 
 /// Innovations with frozen gains, whitened; layout as of the output error.
+#[derive(Clone)]
 pub struct FilterProblem<'a> {
     compiled: &'a Compiled,
     records: &'a [&'a Record],
@@ -166,6 +168,28 @@ pub fn filter_error(
             return Ok((found, noise, simulations, failures));
         }
     }
+}
+
+/// The problem that the last search of a filter-error fit solved: gains and weights frozen at its estimate.
+///
+/// # Errors
+/// What ended the filter's pass, in words.
+pub fn frozen_filter<'a>(
+    compiled: &'a Compiled,
+    records: &'a [&'a Record],
+    fitted: &Fitted,
+) -> Result<FilterProblem<'a>, String> {
+    let level =
+        |name: &str| fitted.process_noise.iter().find(|(state, _)| state == name).map_or(0.0, |(_, level)| *level);
+    let measured = fitted.noise_levels.clone().unwrap_or_default();
+    let noise = NoiseLevels {
+        process: compiled.model.variables().iter().map(|variable| level(&variable.name)).collect(),
+        // Measures without a level are compared nowhere.
+        measured: measured.into_iter().map(|level| level.unwrap_or(1.0)).collect(),
+    };
+    let passes: Result<Vec<Pass>, String> =
+        records.par_iter().map(|record| pass(compiled, record, &fitted.theta, &noise)).collect();
+    Ok(FilterProblem { compiled, records, passes: passes?, simulations: 0, failures: 0 })
 }
 
 fn settled(before: &NoiseLevels, after: &NoiseLevels) -> bool {

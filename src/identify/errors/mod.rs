@@ -16,5 +16,5 @@ mod shooting;
 
 pub use advice::{ErrorReport, OtherError, error_report};
 pub use equation::{EquationFit, equation_error};
-pub(super) use filter::filter_error;
+pub(super) use filter::{filter_error, frozen_filter};
 pub(super) use shooting::{Joined, shooting};
