@@ -14,6 +14,8 @@ mod laws;
 mod models;
 #[path = "study/prelude.rs"]
 mod prelude;
+#[path = "study/reference.rs"]
+mod reference;
 #[path = "study/tables.rs"]
 mod tables;
 #[path = "study/track.rs"]

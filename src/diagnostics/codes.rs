@@ -283,7 +283,8 @@ codes! {
 
     NOT_REPEATABLE "E0246" "cannot be repeated"
     "Models and families contain what can stand in a machine several times: bodies, joints, forces, signals, constants, measures,\n\
-     parts, families, identified parameters. Experiments, inputs, variants, laws and the like stand outside.\n\
+     groups, criteria, parts, families, identified parameters; families also inputs, experiments and manoeuvres, each with the\n\
+     index in its name. Variants, laws and the like stand outside, and what a model is fed with comes in by its ports.\n\
      \n\
      \x20   model corner(carrier: point, command: signal) { .. }\n\
      \x20   input u [mm]\n\

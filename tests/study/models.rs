@@ -145,3 +145,73 @@ fn the_flat_study_is_text() {
     let (_, findings) = ident::syntax::parse(0, &text);
     assert!(findings.is_empty(), "{findings:?}\n{text}");
 }
+
+/// Measures, groups, experiments with their files, manoeuvres and criteria in families and parts.
+const RIG: &str = r#"
+study rig
+gravity = 9.81 m/s^2 along -z
+model corner(frame: point, u: signal) {
+  param stiffness: stiffness
+  body wheel { mass = 40 kg }
+  joint guide: prismatic(z) ground -> wheel
+  force tyre: following_spring on guide { stiffness = 200 kN/m, height = u }
+  force strut: spring_damper wheel -> frame { stiffness = stiffness, damping = 2 kN*s/m }
+  measure z [mm] = guide.position
+  group motion { z }
+}
+body frame { mass = 400 kg, inertia = 40 kg*m^2, point end[1] = (1 m, 0 m, 0 m), point end[2] = (-1 m, 0 m, 0 m) }
+joint float: axes(shift z, turn y) ground -> frame
+for i in 1 .. 2 {
+  input u[i] [mm] "under corner {i}"
+  part corner[i]: corner at frame.end[i], u[i] { stiffness = c }
+  measure a[i] [m/s^2] "of end {i}" = frame.end[i].acceleration.z
+  group side[i] { a[i], corner[i].motion }
+  experiment run[i] estimation {
+    data = "data/run_{i}.csv", start = equilibrium
+    measures = { a[i], corner[i].z }, columns = { corner[i].z = "z[{i}]" }
+  }
+  manoeuvre kerb[i] "kerb under corner {i}" { u[i] = 20 mm * smoothstep(t / 20 ms), u[3 - i] = 0 mm, for 1 s, step = 1 ms }
+  criterion peak[i] [m/s^2] = max(a[i]) in kerb[i]
+}
+identify { c in 10 .. 40 kN/m from 25 kN/m }
+"#;
+
+#[test]
+fn experiments_groups_and_manoeuvres_stand_in_families() {
+    let study = checked(RIG, None);
+    let names = |all: Vec<&str>| all.join(" ");
+    assert_eq!(names(study.experiments.iter().map(|e| e.name.as_str()).collect()), "run[1] run[2]");
+    assert_eq!(names(study.manoeuvres.iter().map(|m| m.name.as_str()).collect()), "kerb[1] kerb[2]");
+    assert_eq!(names(study.groups.groups.iter().map(|group| group.name.as_str()).collect()), "side[1] side[2]");
+    let files: Vec<String> = study.experiments.iter().map(|e| e.data.to_string_lossy().into_owned()).collect();
+    assert!(files[0].ends_with("run_1.csv") && files[1].ends_with("run_2.csv"), "{files:?}");
+    assert!(study.measures.iter().any(|m| m.name == "a[2]" && m.title == "of end 2"));
+}
+
+/// Columns of members of a family are named like them.
+#[test]
+fn fits_read_the_columns_of_families() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::create_dir(folder.path().join("data")).expect("a folder");
+    let path = folder.path().join("rig.ident");
+    std::fs::write(&path, RIG).expect("writable");
+    for run in 1..=2 {
+        let mut text = format!("t [s],u[1] [mm],u[2] [mm],a[{run}] [m/s^2],z[{run}][mm]\n");
+        for k in 0..400 {
+            let t = f64::from(k) * 5e-3;
+            let (u, v) = (5.0 * (20.0 * t).sin(), 3.0 * (31.0 * t).sin());
+            text += &format!("{t},{u},{v},{},{}\n", u + v, u - 0.3 * v);
+        }
+        std::fs::write(folder.path().join(format!("data/run_{run}.csv")), text).expect("writable");
+    }
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_ident"))
+        .args(["fit", "rig.ident"])
+        .current_dir(folder.path())
+        .output()
+        .expect("ident runs");
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{told}{}", String::from_utf8_lossy(&output.stderr));
+    for part in ["side[1]", "side[2]", "corner[2].z"] {
+        assert!(told.contains(part), "`{part}` is missing:\n{told}");
+    }
+}

@@ -38,6 +38,11 @@ impl Elaborator<'_, '_> {
             }
             ItemKind::Body { name, fields, points } => {
                 self.named_fields(name, fields, scope);
+                for point in points.iter_mut() {
+                    if let Some(key) = self.indexed(&point.key, scope) {
+                        point.key.text = key;
+                    }
+                }
                 let path = name.text.clone();
                 self.fields(points, &path, scope);
             }
