@@ -187,19 +187,19 @@ fn turn(graph: &mut Graph, tree: &Tree, frames: &[FrameMotion], joint: &Joint, n
         let both = ends.carried(graph, direction);
         ends.in_ground(graph, frames, both)
     };
-    let angle = match directions(joint, true).as_slice() {
-        &[axis] => {
+    let angle = match *directions(joint, true).as_slice() {
+        [axis] => {
             let [across, beyond] = vector::perpendicular(axis);
             let [across, turned] = carried(graph, across);
             let [beyond, _] = carried(graph, beyond);
             let [moment, _] = carried(graph, axis);
             Angle { plane: [across, beyond], turned, moment, drawn: 0.0 }
         }
-        &[a, b] => {
+        [a, b] => {
             let ([a_near, a_far], [b_near, b_far]) = (carried(graph, a), carried(graph, b));
             two_turns(graph, number, [a_near, a_far, b_near, b_far], dot(a, b).abs() < RIGHT)
         }
-        &[a, b, c] if dot(a, b).abs() < RIGHT && dot(b, c).abs() < RIGHT && dot(a, c).abs() < 1.0 - RIGHT => {
+        [a, b, c] if dot(a, b).abs() < RIGHT && dot(b, c).abs() < RIGHT && dot(a, c).abs() < 1.0 - RIGHT => {
             let (near, far) = ([a, b].map(|v| carried(graph, v)[0]), [b, c].map(|v| carried(graph, v)[1]));
             cardan(graph, number, [a, b, c], near, far)
         }
