@@ -7,8 +7,11 @@
 mod problems;
 mod support;
 
+use ident::fit::Control;
+use ident::identify::{Settings, Weighting, fit};
 use ident::integrate::Dynamics;
 use ident::simulation::{Gradient, Trajectory, simulate};
+use ident::statistics::NormalStream;
 use ident::tape::Bound;
 use support::{compile, record, timed};
 
@@ -151,11 +154,49 @@ fn first_good(
     None
 }
 
+/// All ten parameters of P1 from the problem's start values and noise of 1 % of every channel's standard deviation.
+fn identification(peer: f64) {
+    /// Tolerance of the data, and of the simulations that a fit compares with them.
+    const DATA: f64 = 1e-9;
+    const FIT: f64 = 1e-5;
+    const AWAY: [f64; 10] = [0.25, -0.20, 0.30, -0.25, 0.20, -0.30, 0.25, -0.20, 0.30, -0.25];
+    let exact = compile(&problems::p1(DATA));
+    let truth: Vec<f64> = exact.study.parameters.iter().map(|p| p.start).collect();
+    let mut record = record(&exact, 10.0, 1000.0);
+    let run = simulate(&exact, &record, &truth, Gradient::None).expect("data");
+    let mut random = NormalStream::new(20_240_601, 0);
+    let mut weights = Vec::new();
+    for (measured, channel) in record.measured.iter_mut().zip(&run.channels) {
+        let mean = channel.iter().sum::<f64>() / channel.len() as f64;
+        let variance = channel.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / channel.len() as f64;
+        let deviation = 0.01 * variance.sqrt();
+        weights.push(1.0 / deviation);
+        *measured = channel.iter().map(|v| v + deviation * random.normal()).collect();
+    }
+    let compiled = compile(&problems::p1(FIT));
+    let settings = Settings {
+        start: Some(truth.iter().zip(AWAY).map(|(value, away)| value * (1.0 + away)).collect()),
+        weights: Some(Weighting { sources: vec!["known"; weights.len()], weights }),
+        ..Settings::default()
+    };
+    let (seconds, fitted) = timed(3, || {
+        fit(&compiled, &[&record], &settings, &mut |_| Control::Continue).unwrap_or_else(|f| panic!("{}", f.message))
+    });
+    let errors = fitted.theta.iter().zip(&truth).map(|(own, truth)| (own / truth - 1.0).abs());
+    println!(
+        "  identification: {seconds:.3} s, {} simulations, worst parameter error {:.2} %; peer {peer} s: {:.2} times",
+        fitted.simulations,
+        100.0 * errors.fold(0.0, f64::max),
+        seconds / peer
+    );
+}
+
 fn main() {
     let wanted = std::env::args().nth(1).filter(|argument| !argument.starts_with('-'));
     let runs = |name: &str| wanted.as_deref().is_none_or(|wanted| wanted == name);
     if runs("p1") {
         problem("P1", problems::p1, 1000.0, (1e-6, 1e-4), &Peers { call: 0.22, nominal: 0.035, gradient: 0.155 });
+        identification(4.3);
     }
     if runs("p2") {
         problem("P2", problems::p2, 200.0, (1e-6, 4e-4), &Peers { call: 1.19, nominal: 0.19, gradient: 14.0 });

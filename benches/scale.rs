@@ -6,7 +6,7 @@
 mod generated;
 mod support;
 
-use ident::integrate::Dynamics;
+use ident::integrate::{Dynamics, Work};
 use ident::simulation::{Gradient, simulate};
 use ident::tape::Bound;
 use support::{compile, record, timed};
@@ -60,6 +60,17 @@ fn family(name: &str, generate: fn(usize) -> String) {
     println!("growth: rates ^{:.2}, step ^{:.2}\n", exponent(&per_call), exponent(&per_step));
 }
 
+fn counts(work: &Work) -> String {
+    format!(
+        "{} steps, {} rejected, {} residuals, {} factorisations, {}",
+        work.steps,
+        work.rejected_error + work.rejected_newton,
+        work.residuals,
+        work.factorisations,
+        work.method
+    )
+}
+
 fn vehicle() {
     let text = generated::vehicle();
     let (seconds, compiled) = timed(3, || compile(&text));
@@ -75,9 +86,20 @@ fn vehicle() {
     let theta: Vec<f64> = compiled.study.parameters.iter().map(|p| p.start).collect();
     let (nominal, trajectory) =
         timed(1, || simulate(&compiled, &record, &theta, Gradient::None).expect("a simulation"));
-    println!("nominal: {nominal:.2} s for 13 s, {:.1} times real time; {:?}", 13.0 / nominal, trajectory.work);
-    let (gradient, _) = timed(1, || simulate(&compiled, &record, &theta, Gradient::AllParameters).expect("a gradient"));
-    println!("gradient: {gradient:.2} s, {:.1} nominal runs", gradient / nominal);
+    println!(
+        "nominal: {nominal:.2} s for 13 s, {:.1} times real time, {:.2} ms per step; {}",
+        13.0 / nominal,
+        1e3 * nominal / trajectory.work.steps as f64,
+        counts(&trajectory.work)
+    );
+    let (gradient, trajectory) =
+        timed(1, || simulate(&compiled, &record, &theta, Gradient::AllParameters).expect("a gradient"));
+    println!(
+        "gradient: {gradient:.2} s, {:.1} nominal runs, {:.2} ms per step; {}",
+        gradient / nominal,
+        1e3 * gradient / trajectory.work.steps as f64,
+        counts(&trajectory.work)
+    );
 }
 
 fn main() {

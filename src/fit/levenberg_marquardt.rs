@@ -66,6 +66,9 @@ struct Iteration<'a, P: ?Sized> {
     gradient: Vec<f64>,
     /// |residual|
     length: f64,
+    /// Share of the cost by which a run with the gradient differed from one without, at the last step tried with both:
+    /// steps that promise less cannot be judged.
+    resolution: f64,
     /// D, per parameter mapped to `[0,1]`.
     scaling: Vec<f64>,
     radius: f64,
@@ -108,6 +111,7 @@ impl<'a, P: LeastSquares + ?Sized> Iteration<'a, P> {
             residual,
             gradient,
             length,
+            resolution: 0.0,
             scaling: vec![0.0; start.len()],
             radius: 0.0,
             cost_history: vec![length * length],
@@ -203,12 +207,23 @@ impl<'a, P: LeastSquares + ?Sized> Iteration<'a, P> {
         let ratio = actual / predicted;
         self.update_radius(ratio, actual, step.slope / cost, relative, step_length, step.undamped);
         if ratio >= ACCEPTANCE_RATIO {
-            if let Err(failure) = self.accept(theta) {
-                return self.shorten_after(failure, step_length);
-            }
-            return Trial::Accepted(self.verdict(actual, predicted));
+            return match self.accept(theta, length, predicted) {
+                Ok(true) => Trial::Accepted(self.verdict(actual, predicted)),
+                Ok(false) => {
+                    self.radius = FAILURE_SHRINKAGE * step_length.min(self.radius);
+                    self.refused(0.0, predicted)
+                }
+                Err(failure) => self.shorten_after(failure, step_length),
+            };
         }
-        self.verdict(actual, predicted).map_or(Trial::Refused, Trial::Stop)
+        self.refused(actual, predicted)
+    }
+
+    /// What follows from a refused step: the end, where the model promises less than the evaluations can tell.
+    fn refused(&self, actual: f64, predicted: f64) -> Trial {
+        let indiscernible = predicted <= self.resolution && actual.abs() <= self.resolution;
+        let verdict = if indiscernible { Some(StopReason::CostConverged) } else { self.verdict(actual, predicted) };
+        verdict.map_or(Trial::Refused, Trial::Stop)
     }
 
     /// The stopping tests of MINPACK's `lmder` after a trial step (More-1978).
@@ -244,19 +259,27 @@ impl<'a, P: LeastSquares + ?Sized> Iteration<'a, P> {
         }
     }
 
-    fn accept(&mut self, theta: Vec<f64>) -> Result<(), EvaluationFailure> {
+    /// Moves there with residual and gradient, unless the cost of that run, which alone compares with the cost so far,
+    /// does not fall: simulations with gradient take other steps than those without. `length` is that of the residual
+    /// evaluated alone.
+    fn accept(&mut self, theta: Vec<f64>, length: f64, predicted: f64) -> Result<bool, EvaluationFailure> {
         self.gradient_evaluations += 1;
         let (residual, gradient) = self.problem.residual_and_gradient(&theta)?;
         if !all_finite(&residual) || !all_finite(&gradient) || gradient.len() != self.gradient.len() {
             return Err(not_finite());
         }
+        let with_gradient = norm(&residual);
+        self.resolution = ((with_gradient / self.length).powi(2) - (length / self.length).powi(2)).abs();
+        if 1.0 - (with_gradient / self.length).powi(2) < ACCEPTANCE_RATIO * predicted {
+            return Ok(false);
+        }
         self.theta = theta;
-        self.length = norm(&residual);
+        self.length = with_gradient;
         self.residual = residual;
         self.gradient = gradient;
         self.cost_history.push(self.length * self.length);
         self.update_scaling();
-        Ok(())
+        Ok(true)
     }
 
     /// D grows with the columns' norms and never shrinks (More-1978).

@@ -24,15 +24,23 @@ const FIRST_CHANGE: f64 = 0.5;
 /// ... and the step below this share of the span.
 const FIRST_SHARE: f64 = 1e-3;
 
+/// The filtered differences of runs with sensitivities, whose matrix is another one in every step, are filtered anew after so
+/// many of them; they only choose the order.
+const FILTERED_STEPS: usize = 10;
+
 pub(super) struct Bdf {
+    /// Where errors are filtered ([`Newton::filter`]), the differences carry themselves filtered behind themselves: as long
+    /// as the matrix stays, filtering the correction of a step filters all of them.
     history: History,
     newton: Newton,
     norm: ErrorNorm,
-    /// Predicted and then solved: z and z', and the correction between them.
+    /// Predicted and then solved: z and z', and the correction between them, again with itself filtered behind it.
     z: Vec<f64>,
     z_prime: Vec<f64>,
     correction: Vec<f64>,
     scratch: Vec<f64>,
+    /// Renewals of the matrix when the differences were filtered last; none since the start.
+    filtered_at: Option<usize>,
     /// Doubles the step and raises the order until the first sign of error.
     growing: bool,
     trouble: (FailureCause, Option<usize>),
@@ -67,14 +75,17 @@ enum Rejection {
 impl Bdf {
     pub fn new<D: Dynamics + ?Sized>(system: &Augmented<D>, norm: ErrorNorm) -> Self {
         let length = system.length();
+        let newton = Newton::new(system);
+        let kept = if newton.filters() { 2 * length } else { length };
         Self {
-            history: History::new(length),
-            newton: Newton::new(system),
+            history: History::new(kept),
+            newton,
             norm,
             z: vec![0.0; length],
             z_prime: vec![0.0; length],
-            correction: vec![0.0; length],
+            correction: vec![0.0; kept],
             scratch: vec![0.0; length],
+            filtered_at: None,
             growing: true,
             trouble: (FailureCause::StepTooSmall, None),
         }
@@ -85,7 +96,7 @@ impl Bdf {
     }
 
     pub fn solution(&self) -> &[f64] {
-        &self.history.differences[0]
+        &self.history.differences[0][..self.z.len()]
     }
 
     /// Derivative of the solution at the end of the last step.
@@ -106,6 +117,7 @@ impl Bdf {
         let step = if slope * span > FIRST_CHANGE { FIRST_CHANGE / slope } else { span };
         self.history.restart(t, z, z_prime, limits.initial_step.unwrap_or(step).min(limits.maximum_step));
         self.newton.forget();
+        self.filtered_at = None;
         self.z_prime.copy_from_slice(z_prime);
         self.growing = true;
     }
@@ -117,7 +129,7 @@ impl Bdf {
         limits: &Limits,
         end: f64,
     ) -> Result<PlannedStep, Refusal> {
-        self.norm.set_weights(&self.history.differences[0]);
+        self.norm.set_weights(&self.history.differences[0][..self.z.len()]);
         let mut error_failures = 0;
         loop {
             let (step, reaches_end) = limits.fit(self.history.step, self.history.time, end);
@@ -153,7 +165,7 @@ impl Bdf {
         order: usize,
     ) -> Result<(), Refusal> {
         let start = self.history.time;
-        self.norm.set_weights(&self.history.differences[0]);
+        self.norm.set_weights(&self.history.differences[0][..self.z.len()]);
         self.history.order = order;
         self.history.resize(end - start);
         self.history.begin();
@@ -188,7 +200,7 @@ impl Bdf {
         }
         self.solve_sensitivities(system, end).map_err(Rejection::Newton)?;
         if self.norm.is_adaptive() {
-            self.norm.set_weights_between(&self.history.differences[0], &self.z);
+            self.norm.set_weights_between(&self.history.differences[0][..self.z.len()], &self.z);
         }
         let size = self.size_of_correction(system, false);
         let choice = self.choose_order(system, size.norm, false);
@@ -210,13 +222,14 @@ impl Bdf {
             return Ok(());
         }
         self.newton.settle(system, &self.norm, &mut step_end!(self, end, n))?;
+        let length = self.z.len();
         let (y, s) = self.z.split_at_mut(n);
         let (y_prime, s_prime) = self.z_prime.split_at_mut(n);
         let known = &mut self.scratch[n..];
         for ((v, s_prime), s) in known.iter_mut().zip(s_prime.iter()).zip(s.iter()) {
             *v = s_prime - c * s;
         }
-        let solved = &mut self.correction[n..];
+        let solved = &mut self.correction[n..length];
         system.sensitivity_right_hand_side(end, y, y_prime, c, known, solved);
         self.newton.solve_block(solved, p);
         if let Some(place) = first_not_finite(solved) {
@@ -231,24 +244,71 @@ impl Bdf {
         Ok(())
     }
 
+    /// Size of the correction, which is filtered here; `state_only`: without the sensitivities.
     fn size_of_correction<D: Dynamics + ?Sized>(&mut self, system: &Augmented<D>, state_only: bool) -> Size {
-        self.scratch.copy_from_slice(&self.correction);
-        self.size_of_scratch(system, state_only)
+        if self.newton.filters() {
+            let part = if state_only { system.n } else { self.z.len() };
+            let (correction, filtered) = self.correction.split_at_mut(self.z.len());
+            filtered[..part].copy_from_slice(&correction[..part]);
+            self.newton.filter(system, &mut filtered[..part]);
+        }
+        self.size_of_sum(system, &[], state_only)
     }
 
-    /// Leaves the scratch memory changed.
-    fn size_of_scratch<D: Dynamics + ?Sized>(&mut self, system: &Augmented<D>, state_only: bool) -> Size {
-        let part = if state_only { system.n } else { self.scratch.len() };
-        let of = |norm: &mut ErrorNorm, error: &[f64]| if state_only { norm.of_state(error) } else { norm.of(error) };
+    /// Size of the correction with these differences, each times a factor, added to it.
+    fn size_of_sum<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &Augmented<D>,
+        terms: &[(usize, f64)],
+        state_only: bool,
+    ) -> Size {
         // Constraints hold at the ends of steps; what is read between them is interpolated and has the whole error.
-        let between = self.newton.has_multipliers().then(|| of(&mut self.norm, &self.scratch));
-        self.newton.filter(system, &mut self.scratch[..part]);
-        let at_end = of(&mut self.norm, &self.scratch);
-        match between {
-            Some(between) if INTERPOLATED_SHARE * between.norm > at_end.norm => {
-                Size { norm: INTERPOLATED_SHARE * between.norm, ..between }
-            }
-            _ => at_end,
+        if !self.newton.filters() {
+            return self.size_of_part(system, terms, 0, state_only);
+        }
+        let at_end = self.size_of_part(system, terms, self.z.len(), state_only);
+        if !self.newton.has_multipliers() {
+            return at_end;
+        }
+        let between = self.size_of_part(system, terms, 0, state_only);
+        if INTERPOLATED_SHARE * between.norm > at_end.norm {
+            Size { norm: INTERPOLATED_SHARE * between.norm, ..between }
+        } else {
+            at_end
+        }
+    }
+
+    fn size_of_part<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &Augmented<D>,
+        terms: &[(usize, f64)],
+        offset: usize,
+        state_only: bool,
+    ) -> Size {
+        let part = if state_only { system.n } else { self.z.len() };
+        let range = offset..offset + part;
+        let sum = &mut self.scratch[..part];
+        sum.copy_from_slice(&self.correction[range.clone()]);
+        for &(index, factor) in terms {
+            let difference = &self.history.differences[index][range.clone()];
+            sum.iter_mut().zip(difference).for_each(|(sum, d)| *sum += factor * d);
+        }
+        if state_only { self.norm.of_state(sum) } else { self.norm.of(sum) }
+    }
+
+    /// Filters the differences where the matrix has changed since.
+    fn filter_differences<D: Dynamics + ?Sized>(&mut self, system: &Augmented<D>) {
+        let renewals = self.newton.renewals;
+        let patience = if system.p == 0 { 1 } else { FILTERED_STEPS };
+        let is_recent = self.filtered_at.is_some_and(|last| renewals < last + patience);
+        if is_recent || !self.newton.filters() {
+            return;
+        }
+        self.filtered_at = Some(renewals);
+        for difference in &mut self.history.differences[1..=(self.history.order + 1).min(MAXIMUM_ORDER)] {
+            let (difference, filtered) = difference.split_at_mut(self.z.len());
+            filtered.copy_from_slice(difference);
+            self.newton.filter(system, filtered);
         }
     }
 
@@ -264,19 +324,17 @@ impl Bdf {
         let error = sigma[k] * size;
         let scaled = (k + 1) as f64 * error;
         let mut choice = OrderChoice { order: k, error, scaled, scaled_below: f64::INFINITY };
+        self.filter_differences(system);
         if k == 1 {
             return choice;
         }
-        add(&mut self.scratch, &self.correction, &self.history.differences[k]);
-        let below = sigma[k - 1] * self.size_of_scratch(system, state_only).norm;
+        let below = sigma[k - 1] * self.size_of_sum(system, &[(k, 1.0)], state_only).norm;
         choice.scaled_below = k as f64 * below;
         let lower = if k == 2 {
             choice.scaled_below <= 0.5 * scaled
         } else {
-            add(&mut self.scratch, &self.correction, &self.history.differences[k]);
-            accumulate(&mut self.scratch, &self.history.differences[k - 1]);
-            let scaled_two_below = (k - 1) as f64 * sigma[k - 2] * self.size_of_scratch(system, state_only).norm;
-            choice.scaled_below.max(scaled_two_below) <= scaled
+            let two_below = self.size_of_sum(system, &[(k, 1.0), (k - 1, 1.0)], state_only).norm;
+            choice.scaled_below.max((k - 1) as f64 * sigma[k - 2] * two_below) <= scaled
         };
         if lower {
             choice.order = k - 1;
@@ -334,8 +392,7 @@ impl Bdf {
         if k == MAXIMUM_ORDER || k + 1 >= self.history.equal_steps || order_change == 1 {
             return (k, choice.error);
         }
-        subtract(&mut self.scratch, &self.correction, &self.history.differences[k + 1]);
-        let above = self.size_of_scratch(system, system.p == 0).norm / (k + 2) as f64;
+        let above = self.size_of_sum(system, &[(k + 1, -1.0)], system.p == 0).norm / (k + 2) as f64;
         let scaled_above = (k + 2) as f64 * above;
         if k == 1 {
             return if scaled_above < 0.5 * choice.scaled { (2, above) } else { (1, choice.error) };
@@ -375,23 +432,5 @@ impl Bdf {
     /// The solution at a time within the last step.
     pub fn interpolate(&self, t: f64, z: &mut [f64]) {
         self.history.interpolate(t, z);
-    }
-}
-
-fn add(out: &mut [f64], a: &[f64], b: &[f64]) {
-    for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
-        *o = a + b;
-    }
-}
-
-fn subtract(out: &mut [f64], a: &[f64], b: &[f64]) {
-    for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
-        *o = a - b;
-    }
-}
-
-fn accumulate(out: &mut [f64], a: &[f64]) {
-    for (o, a) in out.iter_mut().zip(a) {
-        *o += a;
     }
 }

@@ -22,7 +22,7 @@ pub(super) struct History {
     pub sigma: [f64; KEPT],
     /// Steps taken with this order and length, with the present one (ns).
     pub equal_steps: usize,
-    /// Modified divided differences (phi), each of the length of the solution.
+    /// Modified divided differences (phi), each of the length of the solution; behind it, what follows it linearly.
     pub differences: [Vec<f64>; KEPT],
     /// `t_n - t_{n-i}` (psi), i = 1 ...
     spans: [f64; KEPT],
@@ -59,7 +59,7 @@ impl History {
         self.last_order = 0;
         self.last_step = 0.0;
         self.equal_steps = 0;
-        self.differences[0].copy_from_slice(z);
+        self.differences[0][..z.len()].copy_from_slice(z);
         for (difference, derivative) in self.differences[1].iter_mut().zip(z_prime) {
             *difference = step * derivative;
         }
@@ -133,7 +133,7 @@ impl History {
 
     /// Value and derivative of the predictor polynomial at the end of the step.
     pub fn predict(&self, z: &mut [f64], z_prime: &mut [f64]) {
-        z.copy_from_slice(&self.differences[0]);
+        z.copy_from_slice(&self.differences[0][..z.len()]);
         z_prime.fill(0.0);
         for i in 1..=self.order {
             let gamma = self.gamma[i];
@@ -169,7 +169,7 @@ impl History {
         let distance = t - self.time;
         let mut factor = 1.0;
         let mut ratio = distance / self.spans[0];
-        z.copy_from_slice(&self.differences[0]);
+        z.copy_from_slice(&self.differences[0][..z.len()]);
         for j in 1..=self.last_order {
             factor *= ratio;
             ratio = (distance + self.spans[j - 1]) / self.spans[j];

@@ -22,7 +22,10 @@ const UNKNOWN_RATE: f64 = 100.0;
 const LARGEST_RATIO: f64 = 1.0 / 0.6;
 /// Relative correction below which the matrix counts as that of the solution, and the most renewals to get there.
 const SETTLED: f64 = 1e-9;
-const SETTLE_ITERATIONS: usize = 3;
+const SETTLE_RENEWALS: usize = 3;
+/// Iterations with the old matrix before, as long as each takes the correction to this share of the one before.
+const SETTLE_ITERATIONS: usize = 6;
+const SETTLE_RATE: f64 = 0.3;
 /// Iterations when the equations are to be solved to rounding.
 const POLISH_ITERATIONS: usize = 12;
 /// Correction, in the error norm, that counts as rounding.
@@ -92,6 +95,8 @@ pub(super) struct Newton {
     /// it is not known.
     pub eigenvalue_bound: f64,
     filtered: Vec<f64>,
+    /// How often the matrix has been renewed.
+    pub renewals: usize,
 }
 
 impl Newton {
@@ -105,6 +110,7 @@ impl Newton {
             has_hidden_algebraic: system.structure.has_hidden_algebraic,
             eigenvalue_bound: f64::INFINITY,
             filtered: Vec::new(),
+            renewals: 0,
         }
     }
 
@@ -122,6 +128,7 @@ impl Newton {
 
     fn renew<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, end: &StepEnd) -> Result<(), NewtonFailure> {
         self.matrix.renew(system, (end.time, end.y, end.y_prime), end.leading)?;
+        self.renewals += 1;
         self.rate_factor = CAUTIOUS_RATE;
         if self.has_hidden_algebraic && !system.structure.has_unit_mass {
             self.renew_mass(system, end);
@@ -144,6 +151,11 @@ impl Newton {
     /// Whether the system has constraints with multipliers.
     pub fn has_multipliers(&self) -> bool {
         self.matrix.has_multipliers()
+    }
+
+    /// Whether [`Newton::filter`] changes anything.
+    pub fn filters(&self) -> bool {
+        self.has_hidden_algebraic
     }
 
     /// Replaces an error by what it does to the solution, `J^-1 c dF/dy' e`, where some combinations of differential
@@ -265,19 +277,33 @@ impl Newton {
         (0..self.delta.len()).max_by(|&a, &b| scaled(a).total_cmp(&scaled(b)))
     }
 
-    /// Renews the matrix at a solved step and corrects with it until the matrix is that of the solution: the point at
-    /// which sensitivities are exact derivatives of the discrete solution.
+    /// Corrects a solved step until nothing moves, with the matrix at hand, and renews it there: the point at which
+    /// sensitivities are exact derivatives of the discrete solution.
     pub fn settle<D: Dynamics + ?Sized>(
         &mut self,
         system: &mut Augmented<D>,
         norm: &ErrorNorm,
         end: &mut StepEnd,
     ) -> Result<(), NewtonFailure> {
+        let mut last = f64::INFINITY;
         for _ in 0..SETTLE_ITERATIONS {
-            self.renew_and_correct(system, end)?;
-            if norm.of_whole_correction(&self.delta) * norm.relative() <= SETTLED {
+            self.find_delta(system, end)?;
+            end.correct(&self.delta);
+            let size = norm.of_whole_correction(&self.delta) * norm.relative();
+            let is_slow = size > SETTLE_RATE * last;
+            last = size;
+            if size <= SETTLED || is_slow {
                 break;
             }
+        }
+        for _ in 0..SETTLE_RENEWALS {
+            self.renew_and_correct(system, end)?;
+            let size = norm.of_whole_correction(&self.delta) * norm.relative();
+            // A new matrix that gains nothing stands at the rounding of the equations.
+            if size <= SETTLED || size > SETTLE_RATE * last {
+                break;
+            }
+            last = size;
         }
         Ok(())
     }

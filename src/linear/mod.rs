@@ -1,6 +1,7 @@
 //! Dense and sparse linear algebra behind concrete types: the only module that names faer and nalgebra.
 
 mod basis;
+mod dense_block;
 mod dense_lu;
 mod factorisation;
 mod pattern;

@@ -2,11 +2,13 @@
 //! degree, the first factorisation finds pivots and the structure of the factors by Gilbert-Peierls-1988, and every
 //! further one only recomputes the numbers, until a pivot has become too small and pivots are sought anew.
 
+use super::dense_block::DenseBlock;
 use super::factorisation::{SingularMatrix, subtract_row};
 use super::pattern::SparsityPattern;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
+use std::ops::Range;
 
 /// The diagonal entry is taken as pivot while it is at least this share of the column's largest entry.
 const PREFER_DIAGONAL: f64 = 0.1;
@@ -35,6 +37,11 @@ pub(super) struct SparseLu {
     upper: Triangle,
     inverse_pivot: Vec<f64>,
     row_scale: Vec<f64>,
+    /// Positions from here on are eliminated as a dense block.
+    tail: usize,
+    dense: DenseBlock,
+    /// Per column before the tail: where its lower entries in rows of the tail begin.
+    near_end: Vec<usize>,
     /// Dense column (by original row), zero between uses.
     work: Vec<f64>,
     block: Vec<f64>,
@@ -60,7 +67,7 @@ impl Triangle {
         self.values.clear();
     }
 
-    fn column(&self, k: usize) -> std::ops::Range<usize> {
+    fn column(&self, k: usize) -> Range<usize> {
         self.starts[k]..self.starts[k + 1]
     }
 }
@@ -81,6 +88,9 @@ impl SparseLu {
             upper: Triangle::default(),
             inverse_pivot: vec![0.0; n],
             row_scale: vec![0.0; n],
+            tail: n,
+            dense: DenseBlock::default(),
+            near_end: Vec::new(),
             work: vec![0.0; n],
             block: Vec::new(),
             has_structure: false,
@@ -99,6 +109,7 @@ impl SparseLu {
             self.has_structure = false;
             self.work.fill(0.0);
             self.find_structure(values)?;
+            self.plan_tail();
             self.plan_passes();
             self.has_structure = true;
         }
@@ -109,21 +120,12 @@ impl SparseLu {
 
     /// Numbers only, with the pivots of before; false when one of them has become unsuitable.
     fn refactor(&mut self, values: &[f64]) -> bool {
-        for k in 0..self.columns.len() {
+        for k in 0..self.tail {
             self.scatter(k, values);
-            for u in self.upper.column(k) {
-                let j = self.upper.rows[u];
-                let factor = std::mem::take(&mut self.work[self.pivot_row[j]]);
-                self.upper.values[u] = factor;
-                if factor != 0.0 {
-                    for l in self.lower.column(j) {
-                        self.work[self.lower.rows[l]] -= self.lower.values[l] * factor;
-                    }
-                }
-            }
+            self.eliminate(k, false);
             let pivot = std::mem::take(&mut self.work[self.pivot_row[k]]);
             let largest = self.lower.column(k).fold(pivot.abs(), |a, l| a.max(self.work[self.lower.rows[l]].abs()));
-            if !(pivot.abs() > SINGULAR && pivot.abs() >= REUSE_PIVOT * largest && largest.is_finite()) {
+            if !serves(pivot, largest) {
                 return false;
             }
             self.inverse_pivot[k] = 1.0 / pivot;
@@ -131,7 +133,103 @@ impl SparseLu {
                 self.lower.values[l] = std::mem::take(&mut self.work[self.lower.rows[l]]) * self.inverse_pivot[k];
             }
         }
-        true
+        self.dense.clear();
+        for k in self.tail..self.columns.len() {
+            self.scatter(k, values);
+            self.eliminate(k, true);
+            self.take_dense_column(k);
+        }
+        for k in 0..self.tail {
+            for l in self.near_end[k]..self.lower.starts[k + 1] {
+                self.dense.set_below(self.lower.positions[l] - self.tail, k, self.lower.values[l]);
+            }
+        }
+        let is_sound = self.dense.factor(serves);
+        if is_sound {
+            self.spread_dense_block();
+        }
+        is_sound
+    }
+
+    /// Subtracts from the work column what the columns before it contribute; `near` only to rows before the tail: to those of the
+    /// tail a product of matrices does it at once.
+    fn eliminate(&mut self, k: usize, near: bool) {
+        for u in self.upper.column(k) {
+            let j = self.upper.rows[u];
+            if j >= self.tail {
+                continue;
+            }
+            let factor = std::mem::take(&mut self.work[self.pivot_row[j]]);
+            self.upper.values[u] = factor;
+            if factor == 0.0 {
+                continue;
+            }
+            let end = if near { self.near_end[j] } else { self.lower.starts[j + 1] };
+            let below = self.lower.starts[j]..end;
+            for (&row, value) in self.lower.rows[below.clone()].iter().zip(&self.lower.values[below]) {
+                self.work[row] -= value * factor;
+            }
+        }
+    }
+
+    /// Moves the work column to column k of the dense block, and its factors before the tail beside it.
+    fn take_dense_column(&mut self, k: usize) {
+        let column = self.dense.column_mut(k - self.tail);
+        for (value, &row) in column.iter_mut().zip(&self.pivot_row[self.tail..]) {
+            *value = std::mem::take(&mut self.work[row]);
+        }
+        for u in self.upper.column(k).filter(|&u| self.upper.rows[u] < self.tail) {
+            self.dense.set_beside(self.upper.rows[u], k - self.tail, self.upper.values[u]);
+        }
+    }
+
+    /// Decides on the tail; entries of columns before it are put in order, those of rows before it first.
+    fn plan_tail(&mut self) {
+        self.tail = self.dense_tail();
+        let size = self.columns.len() - self.tail;
+        self.dense.resize(size, self.tail);
+        self.near_end.clear();
+        for k in 0..self.tail {
+            let entries = self.lower.column(k);
+            let (near, far): (Vec<usize>, Vec<usize>) =
+                entries.clone().partition(|&l| self.lower.positions[l] < self.tail);
+            self.near_end.push(entries.start + near.len());
+            let order = [near, far].concat();
+            let sorted = |from: &[usize]| -> Vec<usize> { order.iter().map(|&l| from[l]).collect() };
+            let (rows, positions) = (sorted(&self.lower.rows), sorted(&self.lower.positions));
+            let values: Vec<f64> = order.iter().map(|&l| self.lower.values[l]).collect();
+            self.lower.rows[entries.clone()].copy_from_slice(&rows);
+            self.lower.positions[entries.clone()].copy_from_slice(&positions);
+            self.lower.values[entries].copy_from_slice(&values);
+        }
+        for k in self.tail..self.columns.len() {
+            let tail = self.tail;
+            let column = self.dense.column_mut(k - tail);
+            column[k - tail] = 1.0 / self.inverse_pivot[k];
+            self.lower.column(k).for_each(|l| column[self.lower.positions[l] - tail] = self.lower.values[l]);
+            for u in self.upper.column(k) {
+                if let Some(at) = self.upper.rows[u].checked_sub(tail) {
+                    column[at] = self.upper.values[u];
+                }
+            }
+        }
+    }
+
+    /// The factors of the dense block to where those of the whole matrix stand.
+    fn spread_dense_block(&mut self) {
+        let tail = self.tail;
+        for k in tail..self.columns.len() {
+            let column = self.dense.column_mut(k - tail);
+            self.inverse_pivot[k] = 1.0 / column[k - tail];
+            for l in self.lower.column(k) {
+                self.lower.values[l] = column[self.lower.positions[l] - tail];
+            }
+            for u in self.upper.column(k) {
+                if let Some(at) = self.upper.rows[u].checked_sub(tail) {
+                    self.upper.values[u] = column[at];
+                }
+            }
+        }
     }
 
     /// Puts scaled column k of the matrix into the work column.
@@ -242,8 +340,11 @@ impl SparseLu {
             self.forward.run_one(&mut self.block, None);
             self.backward.run_one(&mut self.block, Some(&self.inverse_pivot));
         } else {
-            self.forward.run(&mut self.block, width, None);
-            self.backward.run(&mut self.block, width, Some(&self.inverse_pivot));
+            let tail = self.tail;
+            self.forward.run(&mut self.block, width, 0..tail, None);
+            self.dense.solve(&mut self.block[tail * width..], width);
+            self.backward.run(&mut self.block, width, tail..n, None);
+            self.backward.run(&mut self.block, width, 0..tail, Some(&self.inverse_pivot));
         }
         for (k, &column) in self.columns.iter().enumerate().filter(|(_, column)| **column < self.wanted) {
             x[column * width..(column + 1) * width].copy_from_slice(&self.block[k * width..(k + 1) * width]);
@@ -253,7 +354,7 @@ impl SparseLu {
     /// Which parts of the factors a solution needs: what right-hand sides reach, and what wanted elements depend on.
     fn plan_passes(&mut self) {
         let n = self.columns.len();
-        let tail = self.dense_tail();
+        let tail = self.tail;
         let mut is_reached: Vec<bool> = self.pivot_row.iter().map(|&row| row < self.wanted).collect();
         self.forward.clear();
         for k in 0..n {
@@ -296,6 +397,11 @@ impl SparseLu {
     }
 }
 
+/// Whether a pivot found before may be used again, with the largest entry left in its column.
+fn serves(pivot: f64, largest: f64) -> bool {
+    pivot.abs() > SINGULAR && pivot.abs() >= REUSE_PIVOT * largest && largest.is_finite()
+}
+
 /// The entries of a triangular factor in the order in which a solution reads them.
 #[derive(Clone, Debug, Default)]
 struct Pass {
@@ -326,7 +432,7 @@ impl Pass {
         *self = Self::default();
     }
 
-    fn add(&mut self, position: usize, entries: impl Iterator<Item = (usize, usize)>, dense: std::ops::Range<usize>) {
+    fn add(&mut self, position: usize, entries: impl Iterator<Item = (usize, usize)>, dense: Range<usize>) {
         let first = self.dense_from.len();
         self.dense_from.resize(first + dense.len(), ABSENT);
         for (target, from) in entries {
@@ -379,24 +485,22 @@ impl Pass {
         }
     }
 
-    fn run(&self, x: &mut [f64], width: usize, inverse_pivot: Option<&[f64]>) {
-        let (mut start, mut dense) = (0, 0);
+    /// What the sources at `positions` subtract through scattered entries, dense ranges left out.
+    fn run(&self, x: &mut [f64], width: usize, positions: Range<usize>, inverse_pivot: Option<&[f64]>) {
+        let mut start = 0;
         for source in &self.sources {
             let (position, end) = (source.position as usize, source.end as usize);
+            let entries = start..end;
+            start = end;
+            if !positions.contains(&position) {
+                continue;
+            }
             if let Some(inverse) = inverse_pivot {
                 x[position * width..(position + 1) * width].iter_mut().for_each(|value| *value *= inverse[position]);
             }
-            for (target, factor) in self.targets[start..end].iter().zip(&self.values[start..end]) {
+            for (target, factor) in self.targets[entries.clone()].iter().zip(&self.values[entries]) {
                 subtract_row(x, *target as usize, position, width, *factor);
             }
-            for k in 0..source.dense_length as usize {
-                let factor = self.dense_values[dense + k];
-                if factor != 0.0 {
-                    subtract_row(x, source.dense_begin as usize + k, position, width, factor);
-                }
-            }
-            start = end;
-            dense += source.dense_length as usize;
         }
     }
 }

@@ -8,6 +8,7 @@ mod certificate;
 mod delay;
 mod failure;
 mod inputs;
+mod involved;
 mod manoeuvre;
 mod prepare;
 mod run;

@@ -2,6 +2,7 @@
 
 use super::delay::{Delays, Schedule};
 use super::failure::{Detail, Failure};
+use super::involved::with_elements;
 use super::prepare::Record;
 use super::slowness::Slowness;
 use crate::diagnostics::{Code, Diagnostic};
@@ -157,7 +158,8 @@ fn run(
     bound.set_parameter_scale(compiled.study.parameters.iter().map(Parameter::scale).collect());
     let name = |i: usize| compiled.model.variables()[i].name.clone();
     let blame = |bound: &Bound, failure: integrate::Failure| {
-        Failure::from_integration(&record.name, &failure, name, |i| bound.equation_name(i))
+        let equation = |i: usize| with_elements(compiled, i, bound.equation_name(i));
+        Failure::from_integration(&record.name, &failure, name, equation)
     };
     let start = start(compiled, &mut bound, record, with_gradient).map_err(|failure| blame(&bound, failure))?;
     let schedule = Schedule::new(&compiled.delays, record, theta).ok_or_else(|| no_schedule(record, start.time))?;

@@ -1,5 +1,5 @@
-//! The derivative of a run in one direction of the parameters by dual numbers: an explicit model and its variation as one
-//! system of twice the size, along a recorded sequence of steps.
+//! The derivative of a run in one direction of the parameters by dual numbers: a model and its variation as one system of
+//! twice the size, along a recorded sequence of steps.
 
 use super::delay::Schedule;
 use super::failure::Failure;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 const DISTANCE: f64 = 1e-4;
 const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
 
-/// Derivative of the record's channels along `direction`, the steps of `plan` held. The model must have explicit rates.
+/// Derivative of the record's channels along `direction`, the steps of `plan` held.
 ///
 /// # Errors
 /// [`Failure`] of the start or of a step.
@@ -37,9 +37,14 @@ pub(super) fn tangent(
     let options = Options { follow_plan: Some(plan), ..options(&compiled.study) };
     let schedule = Schedule::new(&compiled.delays, record, theta).ok_or_else(|| no_schedule(record, start.time))?;
     let outcome = integrate::integrate(&mut doubled, &start, &schedule.times, &record.breakpoints, &options);
-    let solution = outcome.map_err(|failure| blame(doubled.bound, failure))?;
+    let mut solution = outcome.map_err(|failure| blame(doubled.bound, failure))?;
     let Doubled { bound, mut variation, .. } = doubled;
     let n = compiled.model.dimension();
+    for (&time, values) in solution.times.iter().zip(solution.y.chunks_exact_mut(2 * n)) {
+        if time == start.time {
+            values.copy_from_slice(&start.y);
+        }
+    }
     let mut slopes = vec![0.0; compiled.model.output_count()];
     let mut values = slopes.clone();
     let mut channels = vec![vec![0.0; record.sample_count()]; record.measures.len()];
@@ -60,16 +65,19 @@ pub(super) fn tangent(
     Ok(channels)
 }
 
-/// Start values, and their derivative by differences.
+/// Start values with the constraint forces there, and their derivative by differences.
 fn doubled_start(
     compiled: &Compiled,
     record: &Record,
     theta: &[f64],
     direction: &[f64],
 ) -> Result<Start, integrate::Failure> {
-    let at = |share: f64| {
+    let at = |share: f64| -> Result<Start, integrate::Failure> {
         let moved: Vec<f64> = theta.iter().zip(direction).map(|(t, d)| t + share * d).collect();
-        start(compiled, &mut Bound::new(&compiled.model, &record.inputs, &moved), record, false)
+        let mut bound = Bound::new(&compiled.model, &record.inputs, &moved);
+        let start = start(compiled, &mut bound, record, false)?;
+        let first = integrate::integrate(&mut bound, &start, &[start.time], &[], &options(&compiled.study))?;
+        Ok(Start { y: first.y, ..start })
     };
     let nominal = at(0.0)?;
     let mut slopes = vec![0.0; nominal.y.len()];
@@ -83,7 +91,8 @@ fn doubled_start(
     Ok(Start { time: nominal.time, y_prime: vec![0.0; y.len()], y, sensitivity: Vec::new() })
 }
 
-/// `y' = f`, `s' = f_y s + f_theta d`.
+/// `y' = f(t, y, w)`, `0 = g(t, y, w)` and their derivatives along the direction: those of the rates and constraints by dual
+/// numbers.
 struct Doubled<'b, 'm> {
     bound: &'b mut Bound<'m>,
     variation: Tangent,
@@ -101,7 +110,7 @@ impl<'b, 'm> Doubled<'b, 'm> {
             entries.iter().copied().chain(entries.iter().map(|(row, column)| (row + n, column + n))).collect();
         Self {
             scale: bound.scale().repeat(2),
-            differential: vec![true; 2 * n],
+            differential: bound.differential().repeat(2),
             pattern: SparsityPattern::from_entries(2 * n, 2 * n, &both),
             half: vec![0.0; entries.len()],
             variation,
@@ -135,7 +144,8 @@ impl Dynamics for Doubled<'_, '_> {
 
     fn residual(&mut self, t: f64, y: &[f64], y_prime: &[f64], residual: &mut [f64]) {
         self.rates(t, y, residual);
-        residual.iter_mut().zip(y_prime).for_each(|(r, derivative)| *r = derivative - *r);
+        let rows = residual.iter_mut().zip(y_prime).zip(&self.differential);
+        rows.filter(|(_, differential)| **differential).for_each(|((r, derivative), _)| *r = derivative - *r);
     }
 
     fn pattern(&self) -> &SparsityPattern {
@@ -154,7 +164,10 @@ impl Dynamics for Doubled<'_, '_> {
     fn parameter_derivative(&mut self, _t: f64, _y: &[f64], _y_prime: &[f64], _values: &mut [f64]) {}
 
     fn explicit_rates(&mut self, t: f64, y: &[f64], rates: &mut [f64]) -> bool {
-        self.rates(t, y, rates);
-        true
+        let is_explicit = self.differential.iter().all(|differential| *differential);
+        if is_explicit {
+            self.rates(t, y, rates);
+        }
+        is_explicit
     }
 }

@@ -25,8 +25,10 @@ pub(super) struct Expansion {
     seeds: Vec<Seed>,
     /// Slots that are one: from a rate's equation to the node that is the rate.
     ones: Vec<u32>,
-    /// `slot[0] += slot[1] * slot[2]`, one after the other.
-    products: Vec<[u32; 3]>,
+    /// One after the other.
+    eliminations: Vec<Elimination>,
+    /// `slot[0] += outer * slot[1]`, in the order of the eliminations.
+    products: Vec<[u32; 2]>,
     /// By rows of intermediate results ascending (each after what it depends on), then by rows of rates.
     entries: Vec<Entry>,
     /// Places of the ones on the diagonal of intermediate results.
@@ -50,6 +52,13 @@ struct Entry {
     place: u32,
 }
 
+/// The end of the products of one reader of an eliminated node, and the slot of its derivative by that node.
+#[derive(Clone, Copy, Debug)]
+struct Elimination {
+    outer: u32,
+    end: u32,
+}
+
 /// Memory of the evaluation.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Memory {
@@ -64,7 +73,8 @@ struct Nodes {
     operands: Vec<Vec<(u32, u32)>>,
     readers: Vec<Vec<u32>>,
     slot_count: u32,
-    products: Vec<[u32; 3]>,
+    eliminations: Vec<Elimination>,
+    products: Vec<[u32; 2]>,
 }
 
 impl Nodes {
@@ -73,6 +83,7 @@ impl Nodes {
             operands: vec![Vec::new(); count],
             readers: vec![Vec::new(); count],
             slot_count: 0,
+            eliminations: Vec::new(),
             products: Vec::new(),
         }
     }
@@ -105,8 +116,9 @@ impl Nodes {
             let (_, outer) = list.swap_remove(at);
             for &(operand, inner) in &operands {
                 let slot = self.slot(reader, operand);
-                self.products.push([slot, outer, inner]);
+                self.products.push([slot, inner]);
             }
+            self.eliminations.push(Elimination { outer, end: self.products.len() as u32 });
         }
         for (operand, _) in operands {
             self.readers[operand as usize].retain(|reader| *reader != node);
@@ -193,7 +205,8 @@ impl Expansion {
         let units = (n..size).map(|i| place(i, i)).collect();
         let diagonal = (0..state_count).map(|i| place(i, i)).collect();
         let slot_count = nodes.slot_count as usize;
-        Self { slot_count, seeds, ones, products: nodes.products, entries, units, diagonal, pattern }
+        let Nodes { eliminations, products, .. } = nodes;
+        Self { slot_count, seeds, ones, eliminations, products, entries, units, diagonal, pattern }
     }
 
     /// Values in the order of the pattern: rows of rates as in `c y' - rates` (constraints: `rates`), columns of variables in
@@ -212,8 +225,16 @@ impl Expansion {
         slots.resize(self.slot_count, 0.0);
         self.seeds.iter().for_each(|s| slots[s.slot as usize] += partials[s.instruction as usize][s.operand as usize]);
         self.ones.iter().for_each(|&slot| slots[slot as usize] = 1.0);
-        for &[target, outer, inner] in &self.products {
-            slots[target as usize] += slots[outer as usize] * slots[inner as usize];
+        let mut begin = 0;
+        for elimination in &self.eliminations {
+            let end = elimination.end as usize;
+            let outer = slots[elimination.outer as usize];
+            if outer != 0.0 {
+                for &[target, inner] in &self.products[begin..end] {
+                    slots[target as usize] += outer * slots[inner as usize];
+                }
+            }
+            begin = end;
         }
         values.fill(0.0);
         memory.scale.clear();
