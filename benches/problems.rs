@@ -90,7 +90,7 @@ fn problem(name: &str, text: fn(f64) -> String, rate: f64, wanted: (f64, f64), p
         );
         if let Some((tolerance, error, time, run)) = nominal {
             println!(
-                "  nominal, {method}: {time:.4} s at tolerance {tolerance:.0e}, error {error:.1e}, {} steps {}; peer {} s: {:.2} times",
+                "  nominal, {method}: {time:.4} s at tolerance {tolerance:.1e}, error {error:.1e}, {} steps {}; peer {} s: {:.2} times",
                 run.work.steps,
                 run.work.method,
                 peers.nominal,
@@ -114,7 +114,7 @@ fn problem(name: &str, text: fn(f64) -> String, rate: f64, wanted: (f64, f64), p
             let plain = compile(&with_method(text, tolerance, method));
             let (nominal, _) = timed(5, || simulate(&plain, &record, &theta, Gradient::None).expect("a run"));
             println!(
-                "  gradient, {method}: {time:.4} s at tolerance {tolerance:.0e}, error {error:.1e}, {} steps; peer {} s: {:.2} times; {:.1} nominal runs",
+                "  gradient, {method}: {time:.4} s at tolerance {tolerance:.1e}, error {error:.1e}, {} steps; peer {} s: {:.2} times; {:.1} nominal runs",
                 run.work.steps,
                 peers.gradient,
                 time / peers.gradient,
@@ -135,14 +135,14 @@ fn first_good(
     mut run: impl FnMut(&ident::simulation::Compiled) -> (f64, f64, Trajectory),
     wanted: f64,
 ) -> Option<(f64, f64, f64, Trajectory)> {
-    for half_decade in 6..=20 {
-        let tolerance = 10f64.powf(-0.5 * f64::from(half_decade));
+    for quarter_decade in 12..=40 {
+        let tolerance = 10f64.powf(-0.25 * f64::from(quarter_decade));
         let compiled = compile(&with_method(text, tolerance, method));
         let (error, time, trajectory) = run(&compiled);
         if std::env::args().any(|argument| argument == "--all") {
             let work = &trajectory.work;
             println!(
-                "    {method} {tolerance:.0e}: error {error:.1e}, {time:.4} s, {} steps, {} rejected, {} evaluations, {}",
+                "    {method} {tolerance:.1e}: error {error:.1e}, {time:.4} s, {} steps, {} rejected, {} evaluations, {}",
                 work.steps, work.rejected_error, work.residuals, work.method
             );
         }
@@ -182,6 +182,9 @@ fn identification(peer: f64) {
     let (seconds, fitted) = timed(3, || {
         fit(&compiled, &[&record], &settings, &mut |_| Control::Continue).unwrap_or_else(|f| panic!("{}", f.message))
     });
+    if std::env::args().any(|argument| argument == "--all") {
+        println!("    {} iterations, {}: {:?}", fitted.iterations, fitted.stop_reason, fitted.cost_history);
+    }
     let errors = fitted.theta.iter().zip(&truth).map(|(own, truth)| (own / truth - 1.0).abs());
     println!(
         "  identification: {seconds:.3} s, {} simulations, worst parameter error {:.2} %; peer {peer} s: {:.2} times",

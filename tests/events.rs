@@ -3,7 +3,7 @@
 use ident::diagnostics::render;
 use ident::fit::Control;
 use ident::identify::{Settings, fit};
-use ident::simulation::{Compiled, Gradient, Record, Trajectory, prepare, simulate};
+use ident::simulation::{Compiled, Gradient, Record, Trajectory, certify, prepare, simulate};
 use ident::study::{check, load_text};
 use std::fs;
 
@@ -281,4 +281,14 @@ fn sampled_controller_is_its_recursion() {
     let (compiled, record) = prepared(&at_rest, &["level", "drive"], &times, |i, t| (t + i as f64).sin());
     let again = run(&compiled, &record, &theta);
     assert_eq!(again.channels[1][5].to_bits(), own.channels[1][5].to_bits());
+}
+
+/// Where events move with the parameters, differences of whole runs certify the gradient.
+#[test]
+fn gradients_through_events_have_a_certificate() {
+    let times = grid(1.5, 300);
+    let (compiled, record) = prepared(BALL, &["z [m]", "v [m/s]"], &times, |_, t| t.sin());
+    let digits = certify(&compiled, &[&record], &[0.8, 1.0]).unwrap_or_else(|f| panic!("{f}")).expect("parameters");
+    println!("{digits:.1} digits");
+    assert!(digits > 5.0, "{digits}");
 }

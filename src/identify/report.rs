@@ -58,7 +58,7 @@ pub fn identification(compiled: &Compiled, fitted: &Fitted, records: &[&Record])
     }
 }
 
-/// Digits to which the gradient agrees with differences along the same steps, on the estimation records.
+/// Digits to which the gradient agrees with an independent derivative, on the estimation records.
 fn gradient_digits(
     compiled: &Compiled,
     fitted: &Fitted,
@@ -66,7 +66,13 @@ fn gradient_digits(
     remarks: &mut Vec<String>,
 ) -> Option<f64> {
     match certify(compiled, estimation, &fitted.theta) {
-        Ok(digits) => digits,
+        Ok(digits) => {
+            if compiled.model.switch_count() > 0 {
+                let how = "events move with the parameters: the gradient was compared with differences of whole runs";
+                remarks.push(how.to_owned());
+            }
+            digits
+        }
         Err(failure) => {
             remarks.push(format!("the gradient could not be checked: {failure}"));
             None

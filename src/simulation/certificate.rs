@@ -7,7 +7,7 @@
 
 use super::failure::Failure;
 use super::prepare::Record;
-use super::run::{Compiled, Gradient, Trajectory, follow, record_plan};
+use super::run::{Compiled, Gradient, Trajectory, follow, record_plan, simulate};
 use super::tangent::tangent;
 use crate::integrate::Plan;
 use crate::study::Parameter;
@@ -20,22 +20,30 @@ const DIRECTIONS: usize = 2;
 /// fits best counts. A far distance serves smooth models; laws with a sharp bend need a near one, where rounding limits.
 const DISTANCES: [f64; 6] = [3e-4, 1e-3, 3e-5, 1e-6, 1e-7, 1e-8];
 const SUFFICIENT: f64 = 9.0;
+/// Tolerance of whole runs that are differenced.
+const TIGHT: f64 = 1e-11;
 /// Weights of central differences of sixth order at one, two and three distances.
 const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
 /// An influence below this share of a channel's own size is not judged by itself.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// Digits to which the gradient of `records` at `theta` agrees with differences along the same steps, in random
-/// directions: the worst of all records, channels and directions. None where there is no parameter, or where events move with the parameters.
+/// Digits to which the gradient of `records` at `theta` agrees with an independent derivative along the same steps, in random
+/// directions: the worst of all records, channels and directions. Where events move with the parameters no steps can be held:
+/// there differences of whole runs at a tight tolerance tell, to fewer digits. None where there is no parameter.
 ///
 /// # Errors
 /// [`Failure`] of the run itself.
 pub fn certify(compiled: &Compiled, records: &[&Record], theta: &[f64]) -> Result<Option<f64>, Failure> {
-    // Events move with the parameters: there is no sequence of steps to freeze.
-    let has_switches = compiled.model.switch_count() > 0;
-    if theta.is_empty() || records.is_empty() || has_switches {
+    if theta.is_empty() || records.is_empty() {
         return Ok(None);
     }
+    let has_switches = compiled.model.switch_count() > 0;
+    let tight = has_switches.then(|| {
+        let mut tight = compiled.clone();
+        tight.study.solver.relative_tolerance = tight.study.solver.relative_tolerance.min(TIGHT);
+        tight
+    });
+    let compiled = tight.as_ref().unwrap_or(compiled);
     let tasks: Vec<(&Record, usize)> =
         records.iter().flat_map(|&record| (0..DIRECTIONS).map(move |k| (record, k))).collect();
     let digits: Vec<Result<Option<f64>, Failure>> =
@@ -67,12 +75,12 @@ fn direction(compiled: &Compiled, k: usize) -> Vec<f64> {
 /// For one record and direction; none where no distance could be simulated.
 fn digits(compiled: &Compiled, record: &Record, theta: &[f64], direction: &[f64]) -> Result<Option<f64>, Failure> {
     let (trajectory, plan) = record_plan(compiled, record, theta, Gradient::AllParameters)?;
-    let plan = Arc::new(plan);
+    let plan = (compiled.model.switch_count() == 0).then(|| Arc::new(plan));
     let ours = directional(&trajectory, direction);
     let is_explicit = compiled.model.state_count() == compiled.model.dimension();
     let mut best = None;
-    if !compiled.model.has_events() {
-        match tangent(compiled, record, theta, direction, Arc::clone(&plan)) {
+    if let Some(plan) = plan.as_ref().filter(|_| !compiled.model.has_events()) {
+        match tangent(compiled, record, theta, direction, Arc::clone(plan)) {
             Ok(exact) => best = Some(agreement(&trajectory, &ours, &exact)),
             Err(failure) if is_explicit => return Err(failure),
             // Differenced start values meet constraints to fewer digits than the tightest tolerances ask for.
@@ -83,7 +91,7 @@ fn digits(compiled: &Compiled, record: &Record, theta: &[f64], direction: &[f64]
         }
     }
     for distance in DISTANCES {
-        if let Some(exact) = differences(compiled, record, theta, direction, distance, &plan) {
+        if let Some(exact) = differences(compiled, record, theta, direction, distance, plan.as_ref()) {
             let digits = agreement(&trajectory, &ours, &exact);
             best = Some(best.map_or(digits, |b: f64| b.max(digits)));
         }
@@ -109,20 +117,25 @@ fn directional(trajectory: &Trajectory, direction: &[f64]) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// Along the steps of a plan, or of whole runs.
 fn differences(
     compiled: &Compiled,
     record: &Record,
     theta: &[f64],
     direction: &[f64],
     distance: f64,
-    plan: &Arc<Plan>,
+    plan: Option<&Arc<Plan>>,
 ) -> Option<Vec<Vec<f64>>> {
     let mut sum: Vec<Vec<f64>> = record.measures.iter().map(|_| vec![0.0; record.sample_count()]).collect();
     for (k, weight) in WEIGHTS.iter().enumerate() {
         for sign in [1.0, -1.0] {
             let moved = |(t, d): (&f64, &f64)| t + sign * (k + 1) as f64 * distance * d;
             let theta: Vec<f64> = theta.iter().zip(direction).map(moved).collect();
-            let trajectory = follow(compiled, record, &theta, Arc::clone(plan)).ok()?;
+            let trajectory = match plan {
+                Some(plan) => follow(compiled, record, &theta, Arc::clone(plan)),
+                None => simulate(compiled, record, &theta, Gradient::None),
+            }
+            .ok()?;
             for (sum, channel) in sum.iter_mut().zip(&trajectory.channels) {
                 sum.iter_mut().zip(channel).for_each(|(s, value)| *s += sign * weight * value / distance);
             }
