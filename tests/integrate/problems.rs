@@ -290,3 +290,58 @@ impl Equations for Pendulum {
         ]
     }
 }
+
+/// Chemical Akzo Nobel problem, index 1 (Mazzia-Magherini-2008); one equation is algebraic.
+pub struct AkzoNobel;
+
+impl AkzoNobel {
+    pub fn initial() -> Vec<f64> {
+        vec![0.444, 0.00123, 0.0, 0.007, 0.0, 115.83 * 0.444 * 0.007]
+    }
+
+    /// At t = 180 min, as published with the problem.
+    pub const END: [f64; 6] = [
+        0.1150794920661702,
+        0.1203831471567715e-2,
+        0.1611562887407974,
+        0.3656156421249283e-3,
+        0.1708010885264404e-1,
+        0.4873531310307455e-2,
+    ];
+}
+
+impl Equations for AkzoNobel {
+    fn dimension(&self) -> usize {
+        6
+    }
+
+    fn differential(&self) -> Vec<bool> {
+        vec![true, true, true, true, true, false]
+    }
+
+    fn scale(&self) -> Vec<f64> {
+        vec![1e-3; 6]
+    }
+
+    fn residual<S: Scalar>(&self, _t: f64, y: &[S], d: &[S], _theta: &[S]) -> Vec<S> {
+        let k = S::from;
+        let root = y[1].sqrt();
+        let square = y[0] * y[0];
+        let r1 = k(18.7) * square * square * root;
+        let r2 = k(0.58) * y[2] * y[3];
+        let r3 = k(0.58 / 34.4) * y[0] * y[4];
+        let r4 = k(0.09) * y[0] * y[3] * y[3];
+        let r5 = k(0.42) * y[5] * y[5] * root;
+        let inflow = k(3.3) * (k(0.9 / 737.0) - y[1]);
+        let rates = [
+            -(k(2.0) * r1) + r2 - r3 - r4,
+            inflow - k(0.5) * r1 - r4 - k(0.5) * r5,
+            r1 - r2 + r3,
+            r3 - r2 - k(2.0) * r4,
+            r2 - r3 + r5,
+        ];
+        let mut rows: Vec<S> = (0..5).map(|i| d[i] - rates[i]).collect();
+        rows.push(k(115.83) * y[0] * y[3] - y[5]);
+        rows
+    }
+}

@@ -181,3 +181,17 @@ fn car_axis() {
     insta::assert_snapshot!(table);
     assert!(last >= 6.0, "{last} digits");
 }
+
+/// An algebraic equation among the reactions; the published solution stands in the test.
+#[test]
+fn akzo_nobel() {
+    let mut system = System::new(AkzoNobel, &[]);
+    let start = Start { time: 0.0, y: AkzoNobel::initial(), y_prime: vec![0.0; 6], sensitivity: Vec::new() };
+    for (tolerance, wanted) in [(1e-5, 4.0), (1e-8, 7.0), (1e-11, 9.0)] {
+        let options = Options { relative_tolerance: tolerance, ..Options::default() };
+        let solution = integrate(&mut system, &start, &[180.0], &[], &options).expect("a solution");
+        let digits = digits(&solution.y, &AkzoNobel::END);
+        println!("{tolerance:.0e}: {digits:.1} digits, {} steps", solution.work.steps);
+        assert!(digits >= wanted, "{tolerance}: {digits} digits");
+    }
+}
