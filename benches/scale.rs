@@ -29,7 +29,7 @@ fn exponent(points: &[(f64, f64)]) -> f64 {
 
 fn family(name: &str, generate: fn(usize) -> String) {
     println!("{name:>8} {:>10} {:>12} {:>12} {:>12} {:>10}", "compile s", "rates us", "step us", "steps", "memory MB");
-    let (mut per_step, mut per_call) = (Vec::new(), Vec::new());
+    let (mut per_step, mut per_call, mut memory) = (Vec::new(), Vec::new(), Vec::new());
     for size in [10, 20, 40, 80, 160, 320] {
         let text = generate(size);
         let (seconds, compiled) = timed(3, || compile(&text));
@@ -50,6 +50,7 @@ fn family(name: &str, generate: fn(usize) -> String) {
         let step = run / steps as f64;
         per_step.push((size as f64, step));
         per_call.push((size as f64, call / 100.0));
+        memory.push((size as f64, resident_megabytes()));
         println!(
             "{size:>8} {seconds:>10.3} {:>12.2} {:>12.1} {steps:>12} {:>10.0}",
             call * 1e4,
@@ -57,7 +58,12 @@ fn family(name: &str, generate: fn(usize) -> String) {
             resident_megabytes()
         );
     }
-    println!("growth: rates ^{:.2}, step ^{:.2}\n", exponent(&per_call), exponent(&per_step));
+    println!(
+        "growth: rates ^{:.2}, step ^{:.2}, memory ^{:.2}\n",
+        exponent(&per_call),
+        exponent(&per_step),
+        exponent(&memory)
+    );
 }
 
 fn counts(work: &Work) -> String {
