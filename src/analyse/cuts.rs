@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Factor from the study's tolerance to the coarse one.
-const COARSE: f64 = 1e3;
+const COARSE: f64 = 1e4;
 /// A study without filter is compared with a low-pass whose pass and stop edge are these shares of the sampling rate.
 const LOW_BAND: (f64, f64) = (0.02, 0.04);
 
@@ -41,7 +41,7 @@ pub struct CutCurve {
     pub band: String,
     /// Discrepancy in %, `null` where the simulation fails.
     pub discrepancy: Vec<f64>,
-    /// Mean absolute third difference relative to the range of the curve: what the integrator's error leaves on a smooth curve.
+    /// Scatter about a smooth curve, from fifth differences, relative to the range of the curve: what the integrator's error leaves.
     pub roughness: f64,
 }
 
@@ -123,13 +123,14 @@ fn bands(study: &Study, records: &[&Record]) -> Vec<(Option<Filter>, String)> {
     }
 }
 
-/// Third differences are what noise leaves of a smooth curve.
+/// Fifth differences are what scatter leaves of a smooth curve; their standard deviation is sqrt(252) times that of the scatter.
 fn roughness(values: &[f64]) -> f64 {
     let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     let range = finite.iter().fold(0.0_f64, |a, &b| a.max(b)) - finite.iter().fold(f64::INFINITY, |a, &b| a.min(b));
-    if finite.len() < 5 || range <= 0.0 {
+    if finite.len() < 7 || range <= 0.0 {
         return 0.0;
     }
-    let third = finite.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs());
-    third.sum::<f64>() / (finite.len() - 3) as f64 / range
+    let fifth = finite.windows(6).map(|w| w[5] - 5.0 * w[4] + 10.0 * w[3] - 10.0 * w[2] + 5.0 * w[1] - w[0]);
+    let squares: f64 = fifth.map(|difference| difference * difference).sum();
+    (squares / (finite.len() - 5) as f64 / 252.0).sqrt() / range
 }

@@ -1,8 +1,8 @@
 //! The optimiser of one's choice with the same result as Levenberg-Marquardt's.
 
 use super::alternatives::{Optimiser, observed_search};
-use super::constrained::{Constraints, constrained};
-use super::problem::{BoundState, Bounds, Control, Estimate, FitError, LeastSquares, Options, Progress, StopReason};
+use super::constrained::{Constraints, Region, constrained};
+use super::problem::{BoundState, Control, Estimate, FitError, LeastSquares, Progress, StopReason};
 
 /// What is to search, and how far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,15 +28,14 @@ impl Default for Chosen {
 pub fn minimise<P: LeastSquares, C: Constraints>(
     chosen: Chosen,
     problem: &mut P,
-    constraints: &C,
     start: &[f64],
-    bounds: &Bounds,
-    options: &Options,
+    region: &Region<C>,
     observer: &mut dyn FnMut(&Progress) -> Control,
 ) -> Result<Estimate, FitError> {
     if chosen.optimiser == Optimiser::LevenbergMarquardt {
-        return constrained(problem, constraints, start, bounds, options, observer);
+        return constrained(problem, start, region, observer);
     }
+    let Region { constraints, bounds, .. } = *region;
     let mut admitted = Admitted { problem, constraints };
     let found = observed_search(chosen, &mut admitted, start, bounds, observer);
     let (residual, gradient) = admitted.problem.residual_and_gradient(&found.theta).map_err(FitError::StartFails)?;

@@ -11,6 +11,13 @@ pub trait Constraints {
     fn evaluate(&self, theta: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>);
 }
 
+/// Where a minimum is sought, and how far.
+pub struct Region<'a, C> {
+    pub constraints: &'a C,
+    pub bounds: &'a Bounds,
+    pub options: &'a Options,
+}
+
 /// Largest violation that counts as none, in units of the constraint's change over the bounds.
 const TOLERANCE: f64 = 1e-8;
 const OUTER_ITERATIONS: usize = 20;
@@ -26,12 +33,11 @@ const GROWTH: f64 = 10.0;
 /// As [`levenberg_marquardt`].
 pub fn constrained<P: LeastSquares, C: Constraints>(
     problem: &mut P,
-    constraints: &C,
     start: &[f64],
-    bounds: &Bounds,
-    options: &Options,
+    region: &Region<C>,
     observer: &mut dyn FnMut(&Progress) -> Control,
 ) -> Result<Estimate, FitError> {
+    let Region { constraints, bounds, options } = *region;
     let mut estimate = levenberg_marquardt(problem, start, bounds, options, observer)?;
     let (values, gradients) = constraints.evaluate(&estimate.theta);
     let scales: Vec<f64> = gradients.iter().map(|gradient| change_over_bounds(gradient, bounds)).collect();
@@ -166,7 +172,8 @@ mod tests {
     fn minimum(limit: f64) -> Estimate {
         let bounds = Bounds::new(vec![-3.0; 2], vec![3.0; 2]);
         let observer = &mut |_: &Progress| Control::Continue;
-        constrained(&mut Rosenbrock, &SumBelow(limit), &[-1.2, 1.0], &bounds, &Options::default(), observer).unwrap()
+        let region = Region { constraints: &SumBelow(limit), bounds: &bounds, options: &Options::default() };
+        constrained(&mut Rosenbrock, &[-1.2, 1.0], &region, observer).unwrap()
     }
 
     /// The minimum on the line theta_0 + theta_1 = 1, found by a fine search along it.

@@ -17,7 +17,7 @@ mod step;
 
 pub use alternatives::{Optimiser, Search, observed_search, search};
 pub use chosen::{Chosen, minimise};
-pub use constrained::{Constraints, constrained};
+pub use constrained::{Constraints, Region, constrained};
 pub use cost::{ChannelCost, CostTree, magnitude_weight, noise_weight};
 pub use levenberg_marquardt::levenberg_marquardt;
 pub use loss::{original, robust_deviation, transformed};

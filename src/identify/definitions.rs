@@ -5,7 +5,7 @@ use super::fitting::{Fitted, Settings, bounds, finish, prefilters, prior_rows, s
 use super::problem::Problem;
 use super::weights::{Weighting, first_weights, residual_deviations};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::fit::{BoundState, Control, Estimate, LeastSquares, Progress, StopReason};
+use crate::fit::{BoundState, Control, Estimate, LeastSquares, Optimiser, Progress, StopReason};
 use crate::signal::Prefilter;
 use crate::simulation::{Compiled, Record, stretches_refused};
 use crate::study::ErrorDefinition;
@@ -24,6 +24,39 @@ const WITHOUT_FILTER: &str =
 /// Against minima of a cost that a record's length makes.
 const WITHOUT_SHOOTING: &str =
     "use the output error from several starts, the low frequencies first (`--error output --starts 10 --bands 3`)";
+
+/// What is asked for beside a definition of the error must have an effect.
+pub(super) fn refuse_unused(settings: &Settings) -> Result<(), Diagnostic> {
+    let steps = settings.error == ErrorDefinition::Equation;
+    let what = match settings.error {
+        ErrorDefinition::Output | ErrorDefinition::Shooting => return Ok(()),
+        ErrorDefinition::Equation => "the equation error",
+        ErrorDefinition::Filter => "the filter error",
+    };
+    let wishes = [
+        (settings.coloured_noise, "`noise = coloured`", "colour of its residual is no noise of the measurements"),
+        (settings.bands > 0, "a band widened in steps", "it has no prefilter"),
+        (settings.further_starts > 0, "further starts", "it follows the measured states, not a start"),
+        (
+            steps && !settings.knowledge.is_empty(),
+            "results of other fits",
+            "its own has no covariance to weigh them with",
+        ),
+        (
+            steps && settings.chosen.optimiser != Optimiser::LevenbergMarquardt,
+            "another optimiser",
+            "it is solved in steps",
+        ),
+    ];
+    match wishes.into_iter().find(|(asked, ..)| *asked) {
+        None => Ok(()),
+        Some((_, wish, why)) => {
+            let message = format!("{what} has no use for {wish}: {why}");
+            Err(Diagnostic::error(Code::FIT_FAILED, message)
+                .help("leave that out, or use the output error (`--error output`)"))
+        }
+    }
+}
 
 /// One linear step (or a few), and the output error there for weights and discrepancy.
 pub(super) fn equation(compiled: &Compiled, records: &[&Record], settings: &Settings) -> Result<Fitted, Diagnostic> {

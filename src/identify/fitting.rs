@@ -3,7 +3,7 @@
 use super::bands::bands;
 use super::confidence::RANK_THRESHOLD;
 use super::constraints::StudyConstraints;
-use super::definitions::{equation, filter, shooting_start};
+use super::definitions::{equation, filter, refuse_unused, shooting_start};
 use super::errors::EquationFit;
 use super::knowledge::straightened;
 use super::noise::inflation;
@@ -12,8 +12,8 @@ use super::weights::{Weighting, first_weights, residual_deviations};
 use super::whitening::whitened;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::fit::{
-    Bounds, Chosen, Control, Estimate, FitError, LeastSquares, Options, PriorRow, Progress, StopReason, WithPriors,
-    parallel_starts,
+    Bounds, Chosen, Control, Estimate, FitError, LeastSquares, Options, PriorRow, Progress, Region, StopReason,
+    WithPriors, parallel_starts,
 };
 use crate::signal::{AutoRegression, Prefilter};
 use crate::simulation::{Compiled, Record};
@@ -126,13 +126,14 @@ pub fn prefilters(compiled: &Compiled, records: &[&Record]) -> Result<Vec<Prefil
 ///
 /// # Errors
 /// The model cannot be simulated at the start values, or they lie outside their bounds; the definition of the error does not fit the
-/// study.
+/// study, or has no use for what is asked for beside it.
 pub fn fit(
     compiled: &Compiled,
     records: &[&Record],
     settings: &Settings,
     observer: &mut dyn FnMut(&Progress) -> Control,
 ) -> Result<Fitted, Diagnostic> {
+    refuse_unused(settings)?;
     match settings.error {
         ErrorDefinition::Output => output(compiled, records, settings, observer),
         ErrorDefinition::Equation => equation(compiled, records, settings),
@@ -248,9 +249,10 @@ fn minimise(
     let bounds = bounds(&compiled.study);
     let constraints = StudyConstraints::new(&compiled.study);
     let options = options(settings);
+    let region = Region { constraints: &constraints, bounds: &bounds, options: &options };
     let start = inside(&bounds, start);
     let mut own = WithPriors { problem: &mut *problem, rows };
-    let first = crate::fit::minimise(settings.chosen, &mut own, &constraints, &start, &bounds, &options, observer);
+    let first = crate::fit::minimise(settings.chosen, &mut own, &start, &region, observer);
     if further_starts == 0 {
         return Ok((first.map_err(|error| start_failure(compiled, &error))?, Vec::new()));
     }
@@ -260,7 +262,7 @@ fn minimise(
         .map(|point| {
             let mut own = WithPriors { problem: Problem { simulations: 0, failures: 0, ..problem.clone() }, rows };
             let quiet = &mut |_: &Progress| Control::Continue;
-            let found = crate::fit::minimise(settings.chosen, &mut own, &constraints, point, &bounds, &options, quiet);
+            let found = crate::fit::minimise(settings.chosen, &mut own, point, &region, quiet);
             (own.problem, found)
         })
         .collect();
@@ -297,7 +299,8 @@ pub(super) fn search_once<P: LeastSquares>(
     let constraints = StudyConstraints::new(&compiled.study);
     let mut own = WithPriors { problem, rows };
     let start = inside(&bounds, start);
-    crate::fit::minimise(settings.chosen, &mut own, &constraints, &start, &bounds, &options(settings), observer)
+    let region = Region { constraints: &constraints, bounds: &bounds, options: &options(settings) };
+    crate::fit::minimise(settings.chosen, &mut own, &start, &region, observer)
         .map_err(|error| start_failure(compiled, &error))
 }
 

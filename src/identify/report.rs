@@ -177,6 +177,12 @@ fn way_remarks(compiled: &Compiled, fitted: &Fitted, confidence: &Confidence) ->
             100.0 * gap
         )
     }));
+    if fitted.error == ErrorDefinition::Filter {
+        remarks.push(
+            "discrepancies and curves are those of free simulations: noise in the process lets these run out of step, the fit's own predictions do not"
+                .to_owned(),
+        );
+    }
     remarks.extend(rounding_remarks(compiled, fitted, confidence));
     let coloured = confidence.noise_orders.iter().enumerate().filter(|(_, order)| **order > 0);
     let coloured: Vec<&str> = coloured.map(|(index, _)| channel(index)).collect();

@@ -18,7 +18,8 @@ const LONGEST_STRETCH: f64 = 0.5;
 
 const VARIANT_STYLE: &str = "\
 .line{stroke-width:1.6}.line.variant0{stroke:#d55e00}.line.variant1{stroke:#0072b2}.line.variant2{stroke:#009e73}\
-.line.variant3{stroke:#cc79a7}.line.variant4{stroke:#b58a00}.line.variant5{stroke:#56b4e9}";
+.line.variant3{stroke:#cc79a7}.line.variant4{stroke:#b58a00}.line.variant5{stroke:#56b4e9}\
+.line.broad{stroke-width:6;stroke-opacity:.3}";
 
 const STYLE: &str = "\
 text{font:12px system-ui,'Segoe UI','Helvetica Neue','DejaVu Sans',sans-serif;fill:#59636e}\

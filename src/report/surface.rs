@@ -106,14 +106,24 @@ fn cut_plot(cut: &Cut, (width, height): (f64, f64), drawn: &dyn Fn(&Plot) -> Str
         format!("{band} {:.0e}", curve.tolerance)
     };
     let names: Vec<String> = cut.curves.iter().map(name).collect();
-    let mut marks: Vec<Mark> = cut
-        .curves
+    let finest = cut.curves.iter().map(|curve| curve.tolerance).fold(f64::INFINITY, f64::min);
+    let mut bands: Vec<&str> = cut.curves.iter().map(|curve| curve.band.as_str()).collect();
+    bands.dedup();
+    let mark = |(curve, name): (&'_ CutCurve, &'_ String)| {
+        let colour = bands.iter().position(|band| *band == curve.band).unwrap_or(0);
+        let style = if curve.tolerance > finest { Style::Broad(colour) } else { Style::Variant(colour) };
+        (curve.discrepancy.clone(), style, name.clone())
+    };
+    let mut lines: Vec<(Vec<f64>, Style, String)> = cut.curves.iter().zip(&names).map(mark).collect();
+    // Coarse ones lie beneath.
+    lines.sort_by_key(|(_, style, _)| matches!(style, Style::Variant(_)));
+    let mut marks: Vec<Mark> = lines
         .iter()
-        .zip(&names)
-        .enumerate()
-        .map(|(k, (curve, name))| {
-            let (x, y) = (cut.values.as_slice().into(), curve.discrepancy.as_slice().into());
-            Mark::Line { x, y, style: Style::Variant(k), name }
+        .map(|(y, style, name)| Mark::Line {
+            x: cut.values.as_slice().into(),
+            y: y.as_slice().into(),
+            style: *style,
+            name,
         })
         .collect();
     let at_estimate = cut.curves.first().and_then(|curve| nearest(&cut.values, &curve.discrepancy, cut.at));

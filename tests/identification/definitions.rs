@@ -146,6 +146,7 @@ fn multiple_shooting_finds_what_single_shooting_misses() {
     let multiple = fitted(&compiled, &record, ErrorDefinition::Shooting);
     println!("{:?} {:?} {:?}", single.theta, multiple.theta, multiple.gap);
     assert!((single.theta[0] - 10.0).abs() > 1.0, "single shooting: {:?}", single.theta);
+    assert!(multiple.gap.is_some_and(|gap| gap < 1e-5), "stretches are joined: {:?}", multiple.gap);
     assert!((multiple.theta[0] - 10.0).abs() < 0.05 && (multiple.theta[1] - 0.8).abs() < 0.05, "{:?}", multiple.theta);
     let confidence = confidence(&compiled, &multiple);
     for (j, truth) in [10.0, 0.8].into_iter().enumerate() {
@@ -181,4 +182,21 @@ fn the_field_test_needs_the_filter_error() {
     assert!(state == "pin.velocity" && (level / 1.6 - 1.0).abs() < 0.25, "{state}: {level}");
     let output = with(ErrorDefinition::Output);
     assert!(output.discrepancy() > 100.0 && (output.theta[1] / 6.0 - 1.0).abs() > 0.5, "{:?}", output.theta);
+}
+
+/// Wishes that a definition of the error cannot follow are refused, not passed over.
+#[test]
+fn wishes_without_effect_are_refused() {
+    let (compiled, records) = compiled(&loaded("caster_shimmy"));
+    let records: Vec<&Record> = records.iter().collect();
+    let message = |settings: Settings| {
+        fit(&compiled, &records, &settings, &mut |_| Control::Continue).expect_err("a refusal").message
+    };
+    for (error, name) in [(ErrorDefinition::Filter, "filter"), (ErrorDefinition::Equation, "equation")] {
+        let plain = Settings { error, ..Settings::default() };
+        let coloured = message(Settings { coloured_noise: true, ..plain.clone() });
+        assert!(coloured.contains(name) && coloured.contains("coloured"), "{coloured}");
+        assert!(message(Settings { bands: 2, ..plain.clone() }).contains("band"));
+        assert!(message(Settings { further_starts: 3, ..plain }).contains("starts"));
+    }
 }

@@ -17,6 +17,8 @@ pub enum Style {
     Median,
     /// One of several variants, by a cycle of [`Style::VARIANTS`] colours.
     Variant(usize),
+    /// The same colours as a broad pale line, to lie beneath a thin one.
+    Broad(usize),
 }
 
 impl Style {
@@ -33,6 +35,14 @@ impl Style {
             Style::Variant(index) => {
                 ["variant0", "variant1", "variant2", "variant3", "variant4", "variant5"][index % Style::VARIANTS]
             }
+            Style::Broad(index) => [
+                "broad variant0",
+                "broad variant1",
+                "broad variant2",
+                "broad variant3",
+                "broad variant4",
+                "broad variant5",
+            ][index % Style::VARIANTS],
         }
     }
 }

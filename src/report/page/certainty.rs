@@ -124,7 +124,8 @@ fn profile_view(fit: &Identification, profile: &Profile) -> ProfileView {
         parameter.and_then(|p| Some((p, p.standard_deviation.filter(|sd| *sd > 0.0)?)))
     {
         let parabola = profile.values.iter().map(|value| ((value - parameter.value) / deviation).powi(2)).collect();
-        marks.push(line(parabola, Style::Before, "linear"));
+        // Beneath the profile, which often lies on it.
+        marks.insert(0, line(parabola, Style::Before, "linear"));
     }
     let end = |value: Option<f64>| value.map_or("open".to_owned(), |value| number::significant(value, 4));
     let plot = Plot { legend: true, ..base(marks, format!("{name} [{}]", profile.unit), "deviance".to_owned()) };
