@@ -100,9 +100,15 @@ impl Formula {
             }
             before = after;
         }
+        // A switch at the very begin or end divides nothing.
+        let edge = EDGE * (to - from);
+        found.retain(|t| *t > from + edge && *t < to - edge);
         found
     }
 }
+
+/// Switches closer to an end than this share of the duration are at that end.
+const EDGE: f64 = 1e-9;
 
 fn bisect(is_negative: impl Fn(f64) -> bool, mut low: f64, mut high: f64) -> f64 {
     let at_low = is_negative(low);
@@ -134,5 +140,6 @@ mod tests {
         assert_eq!(formula.evaluate(0.5, 1), 0.0);
         let found = formula.breakpoints(0.0, 3.0);
         assert!(found.len() == 1 && (found[0] - 1.0).abs() < 1e-14, "{found:?}");
+        assert!(formula.breakpoints(1.0, 3.0).is_empty() && formula.breakpoints(0.0, 1.0).is_empty());
     }
 }
