@@ -17,7 +17,7 @@ const NEWTON_RETREAT: f64 = 0.25;
 const MILD: f64 = 0.5;
 const SMALLEST_FACTOR: f64 = 0.25;
 const SAFETY: f64 = 0.9;
-/// Errors between the ends of steps may be this much larger than at the ends.
+/// Errors between the ends of steps may be larger than at the ends by the inverse of this; chosen by trial on mechanisms with loops.
 const INTERPOLATED_SHARE: f64 = 0.03;
 /// First step: the change along the initial slope stays below this in the error norm ...
 const FIRST_CHANGE: f64 = 0.5;
@@ -25,7 +25,7 @@ const FIRST_CHANGE: f64 = 0.5;
 const FIRST_SHARE: f64 = 1e-3;
 
 /// The filtered differences of runs with sensitivities, whose matrix is another one in every step, are filtered anew after so
-/// many of them; they only choose the order.
+/// many of them, a number chosen by trial; they only choose the order.
 const FILTERED_STEPS: usize = 10;
 
 pub(super) struct Bdf {
