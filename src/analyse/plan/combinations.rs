@@ -250,6 +250,13 @@ mod tests {
             assert_eq!(a.choice, b.choice);
         }
         // More is listed only where it helps.
-        assert!(counted.windows(2).all(|pair| pair[1].value < pair[0].value));
+        for (k, larger) in counted.iter().enumerate() {
+            let contained = |smaller: &&Chosen| {
+                let (own, of) = (&smaller.choice, &larger.choice);
+                own.tests.len() <= of.tests.len() && own.sensors.len() <= of.sensors.len()
+            };
+            assert!(counted[..k].iter().filter(contained).all(|smaller| larger.value < smaller.value));
+        }
+        assert!(counted.len() > 2);
     }
 }
