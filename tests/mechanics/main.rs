@@ -1,6 +1,7 @@
 //! Equations of motion and their compiled form against independent derivations.
 
 mod build;
+mod cantilever;
 mod cases;
 mod derivatives;
 mod elastic;
