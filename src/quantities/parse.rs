@@ -72,7 +72,16 @@ fn suggestion(symbol: &str, text: &str) -> Option<String> {
         ));
     }
     let known: Vec<String> = spelled_symbols();
-    similar_name(symbol, known.iter().map(String::as_str)).map(|name| format!("did you mean `{name}`?"))
+    let is_known = |text: &str| known.iter().any(|name| name == text);
+    let similar = similar_name(symbol, known.iter().map(String::as_str));
+    // `kNs`: two units without the sign between them.
+    let product = (1..symbol.len()).rev().filter(|&at| symbol.is_char_boundary(at)).map(|at| symbol.split_at(at));
+    let product = product.into_iter().find(|(left, right)| is_known(left) && is_known(right));
+    match (similar, product) {
+        (Some(name), _) if name.eq_ignore_ascii_case(symbol) => Some(format!("did you mean `{name}`?")),
+        (_, Some((left, right))) => Some(format!("units are multiplied by `*`: `{left}*{right}`")),
+        (similar, None) => similar.map(|name| format!("did you mean `{name}`?")),
+    }
 }
 
 /// All symbols, without and with the prefixes that are in common use.
@@ -226,6 +235,8 @@ mod tests {
         assert_eq!(help("Nm"), "write `N*m`");
         assert_eq!(help("kmh"), "write `km/h`");
         assert_eq!(help("KN"), "did you mean `kN`?");
+        assert_eq!(help("kNs/m"), "units are multiplied by `*`: `kN*s`");
+        assert_eq!(help("Pas"), "units are multiplied by `*`: `Pa*s`");
         assert!(help("G").contains("`g0`"));
         assert!(help("mm*x_0").contains("`2 mm * x_0`"));
         assert_eq!(help("degC/s"), "differences of temperature are written in `K`");

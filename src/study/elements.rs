@@ -232,6 +232,10 @@ impl<'a> Checker<'a> {
             sum = self.graph.add(sum, square);
         }
         if self.graph.is_zero(sum) {
+            // How a body moves whose joint could not be read is not known.
+            if [first.body, second.body].into_iter().flatten().any(|body| self.is_at_broken_joint(body)) {
+                return None;
+            }
             let message = format!("`{}` joins two points that coincide", element.name.text);
             let diagnostic = Diagnostic::error(Code::COINCIDENT_POINTS, message)
                 .label(element.name.span, "its direction is not defined")

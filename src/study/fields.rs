@@ -2,7 +2,7 @@
 
 use super::checker::{Allowed, Checker, Scope};
 use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
-use crate::syntax::{Expression, Field, Name, Value};
+use crate::syntax::{Expression, ExpressionKind, Field, Name, Value};
 
 /// A field with the names of the groups it stands in: `compression.slope`.
 pub(super) struct FlatField<'a> {
@@ -98,7 +98,14 @@ impl<'a> Checker<'a> {
     pub fn field_text(&mut self, field: &'a Field) -> Option<&'a Name> {
         match &field.value {
             Value::Text(text) => Some(text),
-            _ => self.wrong_value(field, "a text in quotation marks"),
+            value => {
+                let message = format!("`{}` must be a text in quotation marks", field.key.text);
+                let mut diagnostic = Diagnostic::error(Code::WRONG_VALUE, message).label(value_span(field), "not that");
+                if let Value::Expression(Expression { kind: ExpressionKind::Path(name), .. }) = value {
+                    diagnostic = diagnostic.help(format!("write `{} = \"{}\"`", field.key.text, name.text));
+                }
+                self.fail(diagnostic, Scope::Study(Allowed::Constant))
+            }
         }
     }
 

@@ -16,16 +16,19 @@ impl<'a> Checker<'a> {
     /// Reads all lines of `identify`; must come before any other expression is evaluated.
     pub fn read_parameters(&mut self) {
         for identified in &self.declared.identify {
-            if self.is_target(&identified.line.target)
-                && let Some(parameter) = self.read_parameter(*identified)
-            {
-                self.parameter_index.insert(parameter.name.clone(), self.parameters.len());
-                if identified.line.per_experiment {
-                    self.split_by_experiment(parameter);
-                } else {
-                    self.parameters.push(parameter);
-                    self.parameter_met.push(false);
-                }
+            if !self.is_target(&identified.line.target) {
+                continue;
+            }
+            let Some(parameter) = self.read_parameter(*identified) else {
+                self.ignore_unknown(&identified.line.target.text);
+                continue;
+            };
+            self.parameter_index.insert(parameter.name.clone(), self.parameters.len());
+            if identified.line.per_experiment {
+                self.split_by_experiment(parameter);
+            } else {
+                self.parameters.push(parameter);
+                self.parameter_met.push(false);
             }
         }
         self.read_offsets();

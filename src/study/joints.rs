@@ -7,7 +7,7 @@ use super::topology::is_parallel;
 use crate::diagnostics::{Code, Diagnostic, similar_name};
 use crate::expression::{Node, vector};
 use crate::quantities::Dimension;
-use crate::syntax::{Direction, DirectionKind, Field, Value};
+use crate::syntax::{Direction, DirectionKind, Expression, ExpressionKind, Field, Value};
 
 const SCOPE: Scope = Scope::Study(Allowed::Number);
 
@@ -222,6 +222,13 @@ impl<'a> Checker<'a> {
             }
             DirectionKind::Vector(vector) => vector,
         };
+        if let [Expression { kind: ExpressionKind::Path(name), span }] = vector.as_slice() {
+            let diagnostic = Diagnostic::error(Code::AXIS, format!("`{}` is no axis", name.text))
+                .label(*span, "not known as a direction")
+                .suggest(LETTERS.into_iter().find(|letter| letter.eq_ignore_ascii_case(&name.text)))
+                .help("an axis is `x`, `y`, `z`, `-z`, or three numbers: `0, 0.6, 0.8`");
+            return self.fail(diagnostic, SCOPE);
+        }
         let what = (direction.span, "a direction has");
         let values: Vec<Option<f64>> =
             vector.iter().map(|component| self.fixed_number(component, None, Dimension::ONE, what)).collect();

@@ -114,6 +114,10 @@ pub fn check(loaded: &Loaded, variant: Option<&str>) -> Result<Checked, Vec<Diag
         findings.retain(|finding| !is_consequence(finding.code));
     }
     findings.extend(loaded.diagnostics.iter().cloned());
+    if findings.iter().any(Diagnostic::is_error) {
+        // What would use it may be what has the error.
+        findings.retain(|finding| finding.is_error() || finding.code != Code::UNUSED_DECLARATION);
+    }
     findings.sort_by_key(|finding| finding.span().map(|span| (span.file, span.start)));
     match study {
         Some(study) if !findings.iter().any(Diagnostic::is_error) => Ok(Checked { study, warnings: findings }),

@@ -296,7 +296,8 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn is_at_broken_joint(&self, body: usize) -> bool {
+    /// Whether a joint of this body could not be read.
+    pub fn is_at_broken_joint(&self, body: usize) -> bool {
         let name = &self.declared.bodies[body].name.text;
         let broken = self.declared.joints.iter().zip(&self.topology.joints).filter(|(_, read)| read.is_none());
         let stands_at = |end: &Name| self.split_path(&end.text).0 == name;

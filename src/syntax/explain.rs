@@ -278,6 +278,16 @@ impl Context<'_> {
                 format!("write `{} = {}`", self.word(-1), self.value_on_line())
             }
             _ if rules.contains(&Rule::range_dots) && found == "." => "a range is written `1 s .. 10 s`".to_owned(),
+            "(" if rules.contains(&Rule::written_unit) => "units stand in square brackets: `[mm]`".to_owned(),
+            _ if self.kind(0) == Some(TokenKind::Number)
+                && self.word(-1) == ","
+                && self.kind(-2) == Some(TokenKind::Number) =>
+            {
+                decimal_comma(self.word(-2), found)
+            }
+            _ if rules.contains(&Rule::range_dots) && found == "from" => {
+                "bounds are written with two points: `10 .. 40 kN/m`".to_owned()
+            }
             _ if rules.contains(&Rule::range_dots) && matches!(found, "to" | "-") => {
                 "a range is written `1 s .. 10 s`".to_owned()
             }
@@ -475,4 +485,8 @@ fn keyword(rule: Rule) -> Option<&'static str> {
         Rule::identify_word => "identify",
         _ => return None,
     })
+}
+
+fn decimal_comma(whole: &str, decimals: &str) -> String {
+    format!("numbers have a decimal point: `{whole}.{decimals}`")
 }

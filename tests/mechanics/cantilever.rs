@@ -62,7 +62,12 @@ fn frequencies_converge_to_those_of_the_beam() {
         let exact = beam(mode as u32);
         let error = |found: &[f64]| (found[mode] / exact - 1.0).abs();
         let ratios = [error(&coarse) / error(&fine), error(&fine) / error(&finest)];
-        println!("mode {}: {:.1e} with 8 links, {:.1e} with 32, ratios {ratios:.2?}", mode + 1, error(&coarse), error(&finest));
+        println!(
+            "mode {}: {:.1e} with 8 links, {:.1e} with 32, ratios {ratios:.2?}",
+            mode + 1,
+            error(&coarse),
+            error(&finest)
+        );
         assert!(error(&finest) < 0.01, "mode {mode} differs by {:.1e}", error(&finest));
         assert!(ratios.iter().all(|ratio| (3.5..4.6).contains(ratio)), "second order: {ratios:?}");
         let extrapolated = (4.0 * finest[mode] - fine[mode]) / 3.0;

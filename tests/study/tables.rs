@@ -133,3 +133,33 @@ fn long_tables_are_treated() {
     let height = study.measures.iter().find(|measure| measure.name == "h").expect("the measure").value;
     close(value(&study, height, &[("t", 0.125 + 16.0 / 20.0)]), 1.6e-3);
 }
+
+/// A run that starts exactly where the table begins, and one that comes back there and leaves it.
+#[test]
+fn runs_start_at_the_edge_of_a_table() {
+    use ident::simulation::{Compiled, Gradient, manoeuvre, simulate};
+    let study = study(
+        "study s
+         table track(s: length) -> length {
+           points = ((0 m, 0 mm), (1 m, 10 mm), (2 m, 0 mm)), interpolation = linear, extrapolation = constant
+         }
+         body wheel { mass = 500 kg }
+         joint guide: prismatic(z) ground -> wheel
+         signal way: travelled { speed = (1.5 m/s) * cos(2 rad/s * t) }
+         force contact: following_spring on guide { stiffness = 1 MN/m, height = track(way) }
+         force damper: damper on guide { damping = 20 kN*s/m }
+         measure z [mm] = guide.position
+         measure s [m] = way
+         manoeuvre go { for 3 s, step = 5 ms, start = rest }
+         criterion c = max(guide.position) in go",
+    );
+    let compiled = Compiled::new(study).unwrap_or_else(|findings| panic!("{findings:?}"));
+    let mut record = manoeuvre(&compiled.study, 0);
+    record.measures = vec![0, 1];
+    let run = simulate(&compiled, &record, &[], Gradient::None).unwrap_or_else(|failure| panic!("{failure:?}"));
+    let (height, way) = (&run.channels[0], &run.channels[1]);
+    assert!(way.iter().any(|s| *s > 0.7) && way.iter().any(|s| *s < -0.5), "within the table and beyond its edge");
+    // Beyond the edge the wheel comes to rest on the first point.
+    assert!(height.last().is_some_and(|z| z.abs() < 1e-3), "{:?}", height.last());
+    assert!(height.iter().any(|z| *z > 6e-3));
+}
