@@ -83,11 +83,7 @@ pub struct Event {
 impl Event {
     /// Everything it is made of.
     pub fn nodes(&self) -> impl Iterator<Item = Node> {
-        let condition = match self.trigger {
-            EventTrigger::Rises(condition) => Some(condition),
-            EventTrigger::Every(_) => None,
-        };
-        condition.into_iter().chain(self.changes.iter().map(|(_, value)| *value))
+        self.trigger.nodes_with(&self.changes)
     }
 }
 

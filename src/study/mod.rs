@@ -116,7 +116,11 @@ pub fn check(loaded: &Loaded, variant: Option<&str>) -> Result<Checked, Vec<Diag
     findings.extend(loaded.diagnostics.iter().cloned());
     if findings.iter().any(Diagnostic::is_error) {
         // What would use it may be what has the error.
-        findings.retain(|finding| finding.is_error() || finding.code != Code::UNUSED_DECLARATION);
+        let is_alone = findings.iter().filter(|f| f.is_error()).all(|finding| finding.code == Code::UNUSED_PARAMETER);
+        findings.retain(|finding| {
+            (finding.is_error() || finding.code != Code::UNUSED_DECLARATION)
+                && (is_alone || finding.code != Code::UNUSED_PARAMETER)
+        });
     }
     findings.sort_by_key(|finding| finding.span().map(|span| (span.file, span.start)));
     match study {

@@ -6,7 +6,9 @@
 
 mod build;
 mod build_expression;
+mod build_law;
 mod build_structure;
+mod build_study;
 mod explain;
 mod format;
 mod grammar;

@@ -425,6 +425,50 @@ fn trees_of_every_kind_of_joint() {
     }
 }
 
+/// Every coordinate of every kind of joint may follow a prescribed motion, walked outwards and inwards, bodies turned.
+#[test]
+fn every_coordinate_of_a_tree_may_be_driven() {
+    let body = |name: &str| {
+        format!(
+            "body {name} {{ mass = 1.5 kg, inertia = (0.3, 0.4, 0.5, 0.02, -0.03, 0.04 kg*m^2), centre_of_gravity = (0.1 m, -0.2 m, 0.15 m), point tip = (0.3 m, 0.1 m, -0.2 m) }}\n"
+        )
+    };
+    let kinds = [
+        ("prismatic(0, 0.6, 0.8)", "orientation = (0 deg, 40 deg, 0 deg)"),
+        ("revolute(0.6, 0, 0.8)", "orientation = (10 deg, 0 deg, 0 deg)"),
+        ("cylindrical(x)", ""),
+        ("universal(x, z)", "orientation = (20 deg, 30 deg, -50 deg)"),
+        ("planar(y)", "orientation = (0 deg, 0 deg, 25 deg)"),
+        ("axes(turn x, shift y, turn z)", ""),
+        ("free", "orientation = (0 deg, 70 deg, 0 deg)"),
+    ];
+    for (kind, fields) in kinds {
+        for ends in ["inner.tip -> outer.tip", "outer.tip -> inner.tip"] {
+            let bodies = body("inner") + &body("outer") + "joint root: revolute(0, 0.6, 0.8) ground -> inner\n";
+            let bare = checked(&format!("study s\n{bodies}joint j: {kind} {ends}\n"), &[]).expect("a study");
+            let axes = &bare.joints[1].axes;
+            for axis in axes {
+                let size = if matches!(axis.motion, AxisMotion::Turn(_)) { "0.4" } else { "0.1 m" };
+                let motion = format!("{size} * sin(9 rad/s * t + 0.3) + {size} * t / 1 s");
+                let motion = match axis.name.strip_prefix("j.") {
+                    Some(name) if axes.len() > 1 => format!("{{ {name} = {motion} }}"),
+                    _ => motion,
+                };
+                let text = format!(
+                    "{bodies}joint j: {kind} {ends} {{ motion = {motion}, {fields} }}\n{GO} {{ root.velocity = 2 rad/s }} }}\n"
+                );
+                prove(
+                    &format!("driven {kind} {ends} {}", axis.name)
+                        .replace(' ', "_")
+                        .replace(|c: char| !c.is_alphanumeric(), "_"),
+                    &text,
+                    1e-9,
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn spatial_four_bar_with_balls() {
     let text = format!(
