@@ -99,7 +99,10 @@ impl<'a> Checker<'a> {
             .iter()
             .enumerate()
             .map(|(at, motion)| {
-                let name = if is_single { name.clone() } else { format!("{name}.{}", axis_name(motion, at)) };
+                // The second turn about one letter (Euler angles) is counted.
+                let is_repeated = motions[..at].iter().any(|before| axis_name(before, 0) == axis_name(motion, 0));
+                let motion_name = if is_repeated { axis_name(&(motion.0, None), at) } else { axis_name(motion, at) };
+                let name = if is_single { name.clone() } else { format!("{name}.{motion_name}") };
                 AxisEntry { symbols: self.axis_symbols(&name), motion: motion.0, name }
             })
             .collect();

@@ -392,6 +392,12 @@ fn trees_of_every_kind_of_joint() {
             "{ orientation = (0 deg, 0 deg, 30 deg) }",
             "turn_1.velocity = 2 rad/s, j.shift_y.velocity = 1 m/s",
         ),
+        // Euler angles; the third has a name of its own.
+        (
+            "axes(turn z, turn x, turn z)",
+            "{ orientation = (5 deg, 0 deg, 0 deg) }",
+            "turn_x.position = 0.9, j.turn_z.velocity = 1 rad/s, j.turn_3.velocity = -2 rad/s",
+        ),
         (
             "cylindrical(z)",
             "{ motion = { turn_z = 3 rad/s * t + 0.2 * sin(8 rad/s * t) } }",
