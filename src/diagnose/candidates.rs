@@ -208,7 +208,7 @@ fn dimension_at(parameter: &EffectParameter, place: &Place) -> Dimension {
 fn amplitude(element: &str, parameter: &EffectParameter, place: &Place, typical: &Typical) -> Option<Unknown> {
     let scale = if parameter.monomial.is_empty() { None } else { Some(natural_scale(parameter, typical)?) };
     let relative = parameter.relative_range.zip(scale).map(|((low, high), scale)| (low * scale, high * scale));
-    let reach = scale.unwrap_or(1.0) * AMPLITUDE_REACH;
+    let reach = rounded_up(scale.unwrap_or(1.0) * AMPLITUDE_REACH);
     let (mut lower, upper) =
         parameter.range.or(relative).unwrap_or((parameter.neutral - reach, parameter.neutral + reach));
     if parameter.one_sided {
@@ -286,6 +286,12 @@ fn freed_constant(study: &Study, constant: &crate::study::Constant) -> Option<Ca
     })
 }
 
+/// The next of 1, 2, 5 times a power of ten: bounds that a reader can take in, and that do not change with every record.
+fn rounded_up(value: f64) -> f64 {
+    let power = 10f64.powf(value.log10().floor());
+    [1.0, 2.0, 5.0].into_iter().map(|digit| digit * power).find(|rounded| *rounded >= value).unwrap_or(10.0 * power)
+}
+
 /// Interior points of a logarithmic division of `lower .. upper` (both positive).
 fn log_spaced(lower: f64, upper: f64, count: usize) -> Vec<f64> {
     let ratio = (upper / lower).ln();
@@ -322,7 +328,14 @@ impl Place {
 
 #[cfg(test)]
 mod tests {
-    use super::log_spaced;
+    use super::{log_spaced, rounded_up};
+
+    #[test]
+    fn bounds_are_round() {
+        for (value, round) in [(702_611.0, 1e6), (1.0, 1.0), (0.0213, 0.05), (190.0, 200.0)] {
+            assert!((rounded_up(value) / round - 1.0).abs() < 1e-12, "{value}");
+        }
+    }
 
     #[test]
     fn log_spacing_lies_inside() {

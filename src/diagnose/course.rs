@@ -5,10 +5,12 @@ use super::judge::{self, Judged};
 use super::records::Roles;
 use super::round::Round;
 use super::screen::Screened;
+use super::telling;
 use super::{Answer, Candidate as Reported, ChannelAnatomy, MissingForce, Step, Verdict};
 use crate::identify::Identification;
 use crate::quantities::Unit;
 use crate::simulation::Compiled;
+use crate::study::ErrorDefinition;
 
 /// Candidates shown in the ranking of a step.
 const SHOWN: usize = 20;
@@ -28,6 +30,8 @@ pub(super) struct Course {
     pub limit_reached: bool,
     /// An accepted cause has rivals besides other names of the same force.
     ambiguous: bool,
+    /// Which tests would tell rivals apart.
+    telling: Vec<String>,
     /// Shape parameters of accepted effects.
     shapes: Vec<String>,
     cannot_judge: Vec<String>,
@@ -60,8 +64,10 @@ impl Course {
         let accepted =
             chosen.and_then(|position| order.iter().position(|&index| index == judged[position].refitted.candidate));
         if let Some(position) = chosen {
-            let aliases = &candidates[judged[position].refitted.candidate].aliases;
-            self.ambiguous |= indistinguishable.len() > 1 + aliases.len();
+            let rivals = judge::rivals(judged, position);
+            self.ambiguous |= !rivals.is_empty();
+            let group: Vec<usize> = std::iter::once(position).chain(rivals).collect();
+            self.telling.extend(telling::telling(round, candidates, judged, &group));
             self.shapes.extend(candidates[judged[position].refitted.candidate].shapes());
         }
         let judgement = judgement(judged, chosen, candidates, self.below_visibility);
@@ -92,6 +98,13 @@ impl Course {
         // A shape at the end of its grid range (a creep velocity too small to be resolved) is no structural error.
         remarks
             .retain(|remark| !self.shapes.iter().any(|shape| remark.starts_with(&format!("{shape} is at its bound"))));
+        remarks.extend(self.telling.iter().cloned());
+        if compiled.study.solver.error != ErrorDefinition::Output {
+            remarks.push(format!(
+                "the study asks for the {} error; causes are looked for with the output error, to which noise in the process looks like one",
+                compiled.study.solver.error.name()
+            ));
+        }
         if self.limit_reached {
             remarks.push(format!("stopped after {} extensions as asked; `--extensions N` goes on", self.accepted()));
         }

@@ -240,16 +240,18 @@ fn objection(
 /// Candidates that cannot be told from `judged[chosen]`: their criterion is as good within what the data can tell, and none
 /// was refused for its plausibility. The chosen one comes first.
 pub(super) fn indistinguishable(judged: &[Judged], chosen: usize, candidates: &[Candidate]) -> Vec<String> {
-    let name = |entry: &Judged| candidates[entry.refitted.candidate].name.clone();
-    let mut group = vec![name(&judged[chosen])];
+    let name = |position: usize| candidates[judged[position].refitted.candidate].name.clone();
+    let mut group = vec![name(chosen)];
     group.extend(candidates[judged[chosen].refitted.candidate].aliases.iter().cloned());
-    for (position, entry) in judged.iter().enumerate() {
-        let close = (entry.bic - judged[chosen].bic).abs() < INDISTINGUISHABLE_BIC;
-        if position != chosen && close && entry.accepted() {
-            group.push(name(entry));
-        }
-    }
+    group.extend(rivals(judged, chosen).into_iter().map(name));
     group
+}
+
+/// Positions of other accepted refits that are as good.
+pub(super) fn rivals(judged: &[Judged], chosen: usize) -> Vec<usize> {
+    let close = |entry: &Judged| (entry.bic - judged[chosen].bic).abs() < INDISTINGUISHABLE_BIC;
+    let others = judged.iter().enumerate().filter(|(position, _)| *position != chosen);
+    others.filter(|(_, entry)| close(entry) && entry.accepted()).map(|(position, _)| position).collect()
 }
 
 /// True where the candidate would be accepted but moves the measured channels by less than can be trusted.

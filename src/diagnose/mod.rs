@@ -4,8 +4,7 @@
 //! particular effect (candidates come from the catalogue written in the language).
 //!
 //! The steps follow the literature on screening by scores (Breusch-Pagan-1980), choice by information criterion
-//! (Schwarz-1978) and judgement on data not used to choose; see `docs/method.md` for what was measured to decide between
-//! alternatives.
+//! (Schwarz-1978) and judgement on data not used to choose.
 
 mod anatomy;
 mod answer;
@@ -18,6 +17,7 @@ mod records;
 mod refit;
 mod round;
 mod screen;
+mod telling;
 mod typical;
 
 pub use answer::*;
@@ -140,13 +140,14 @@ fn extend(
     let round = Round::new(&model.loaded, &model.variant, &model.compiled, &records, &model.fitted);
     let probed: Vec<_> =
         records.iter().filter_map(|record| probe(&model.compiled, record, &model.fitted.theta).ok()).collect();
-    let candidates = candidates::candidates(&model.compiled.study, &typical::typical(&model.compiled, &probed));
-    let screened = screen_all(&round, &candidates, observer);
+    let mut candidates = candidates::candidates(&model.compiled.study, &typical::typical(&model.compiled, &probed));
+    let mut screened = screen_all(&round, &candidates, observer);
+    course.simulations += screened.iter().flatten().map(|entry| entry.simulations).sum::<usize>();
+    screen::merge_equal(&mut candidates, &mut screened, round.current_deviance());
     let refits = refit_best(&round, &candidates, &screened, observer);
     let validation = roles.validation();
     let held_out = HeldOut::new(&model.compiled, &model.fitted, &validation);
     let judged = judge::judge(&round, &candidates, refits, held_out.as_ref());
-    course.simulations += screened.iter().flatten().map(|entry| entry.simulations).sum::<usize>();
     course.simulations += judged.iter().map(|entry| entry.refitted.fitted.simulations).sum::<usize>();
     let mut chosen = judged.iter().position(Judged::accepted);
     if chosen.is_some_and(|position| judge::below_visibility(&round, &judged[position])) {

@@ -60,6 +60,46 @@ pub(super) fn screen(round: &Round, candidate: &Candidate) -> Option<Screened> {
     Some(best)
 }
 
+/// Relative difference below which two screens saw the same force.
+const EQUAL: f64 = 1e-6;
+
+/// One effect at elements that move alike (between the same bodies, or along the axis of their joint) is the very same force:
+/// the first one stands for all, the others become its aliases.
+pub(super) fn merge_equal(candidates: &mut [Candidate], screened: &mut [Option<Screened>], current_deviance: f64) {
+    for first in 0..candidates.len() {
+        for other in first + 1..candidates.len() {
+            let (Some(a), Some(b)) = (&screened[first], &screened[other]) else { continue };
+            let same_effect =
+                candidates[first].effect == candidates[other].effect && !candidates[first].change.is_empty();
+            if same_effect && a.equals(b, current_deviance) {
+                let mut names = std::mem::take(&mut candidates[other].aliases);
+                names.insert(0, candidates[other].name.clone());
+                candidates[first].aliases.extend(names);
+                screened[other] = None;
+            }
+        }
+    }
+}
+
+impl Screened {
+    /// The same strengths have the same effect. What changes nothing tells nothing about that.
+    fn equals(&self, other: &Self, current_deviance: f64) -> bool {
+        let close = |a: f64, b: f64| (a - b).abs() <= EQUAL * a.abs().max(b.abs());
+        let visible = !close(self.deviance, current_deviance);
+        let strengths = match (self.smallest_detectable, other.smallest_detectable) {
+            (Some(a), Some(b)) => close(a, b),
+            (None, None) => visible,
+            _ => false,
+        };
+        let scores = match (self.score, other.score) {
+            (Some(a), Some(b)) => a.1 == b.1 && close(a.0, b.0),
+            (None, None) => visible,
+            _ => false,
+        };
+        strengths && scores && close(self.deviance, other.deviance)
+    }
+}
+
 /// All combinations of shape values, as full vectors of unknowns with strengths at neutral.
 fn shape_grid(round: &Round, candidate: &Candidate) -> Vec<Vec<f64>> {
     let mut grid = vec![candidate.neutral()];
