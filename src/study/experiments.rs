@@ -230,6 +230,16 @@ impl<'a> Checker<'a> {
 
     /// `slide.velocity = v0`, `strut.z = 0 mm`
     fn start_value(&mut self, field: &super::fields::FlatField<'a>) -> Option<(Symbol, Node)> {
+        let joints = self.declared.joints.iter().zip(&self.topology.closes_loop);
+        let closing = joints.filter(|(_, closes)| **closes).map(|(joint, _)| joint.name.text.as_str());
+        let is_within = |name: &str| field.path.strip_prefix(name).is_some_and(|rest| rest.starts_with('.'));
+        if let Some(name) = closing.into_iter().find(|name| is_within(name)) {
+            let message = format!("`{}` has no start value of its own", field.path);
+            let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, message)
+                .label(field.span, format!("`{name}` closes a loop: its coordinates follow from the other joints"))
+                .help("give the start of another joint of the loop, or declare this one before them");
+            return self.fail(diagnostic, SCOPE);
+        }
         let Some((symbol, dimension)) = self.start_target(&field.path) else {
             let message = format!("`{}` has no start value", field.path);
             let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, message)
