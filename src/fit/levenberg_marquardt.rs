@@ -552,6 +552,30 @@ mod tests {
         assert_eq!(result.err(), Some(FitError::StartOutsideBounds { index: 0 }));
     }
 
+    /// Runs with gradient and runs without agree to a few digits only, as simulations with different steps do.
+    struct TwoKinds;
+
+    impl LeastSquares for TwoKinds {
+        fn residual(&mut self, theta: &[f64]) -> Result<Vec<f64>, EvaluationFailure> {
+            Ok(vec![theta[0] - 1.0, 0.98])
+        }
+
+        fn residual_and_gradient(&mut self, theta: &[f64]) -> Result<(Vec<f64>, Vec<f64>), EvaluationFailure> {
+            let ripple = 1e-3 * (1e6 * theta[0]).sin();
+            Ok((vec![theta[0] - 1.0 + ripple, 1.0 + ripple], vec![1.0, 0.0]))
+        }
+    }
+
+    #[test]
+    fn what_the_evaluations_cannot_tell_ends_the_search() {
+        let options = Options::default();
+        let estimate =
+            levenberg_marquardt(&mut TwoKinds, &[3.0], &Bounds::none(1), &options, &mut |_| Control::Continue).unwrap();
+        assert!(estimate.stop_reason.converged(), "{:?}", estimate.stop_reason);
+        assert!(estimate.iterations < 10 && (estimate.theta[0] - 1.0).abs() < 5e-3, "{estimate:?}");
+        assert!(estimate.cost_history.windows(2).all(|pair| pair[1] < pair[0]), "{:?}", estimate.cost_history);
+    }
+
     #[test]
     fn an_observer_ends_the_iteration_with_the_best_so_far() {
         let mut problem = Formula { function: rosenbrock, evaluations: 0 };
