@@ -262,7 +262,6 @@ impl Bdf {
         terms: &[(usize, f64)],
         state_only: bool,
     ) -> Size {
-        // Constraints hold at the ends of steps; what is read between them is interpolated and has the whole error.
         if !self.newton.filters() {
             return self.size_of_part(system, terms, 0, state_only);
         }
@@ -270,6 +269,7 @@ impl Bdf {
         if !self.newton.has_multipliers() {
             return at_end;
         }
+        // Constraints hold at the ends of steps; what is read between them is interpolated and has the whole error.
         let between = self.size_of_part(system, terms, 0, state_only);
         if INTERPOLATED_SHARE * between.norm > at_end.norm {
             Size { norm: INTERPOLATED_SHARE * between.norm, ..between }
