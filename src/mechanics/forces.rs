@@ -3,10 +3,10 @@
 use super::articulated::Wrench;
 use super::closing::at_closing_joint;
 use super::kinematics::{self, FrameMotion};
-use super::topology::{Coordinate, Seat, Tree};
+use super::topology::{Axis, Coordinate, Seat, Tree};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::expression::vector::{self, Matrix, Vector};
-use crate::expression::{Graph, Node, Unary};
+use crate::expression::vector::{self, Vector};
+use crate::expression::{Binary, Graph, Node, Unary};
 use crate::study::{Force, ForceDirection, ForcePlace, Motion, Study};
 
 /// Geometry of one force element.
@@ -131,8 +131,9 @@ fn turning_axis(
     (vector::apply(graph, orientation, axis), seat.link)
 }
 
-/// Angle of the second body against the first about an axis: that between the projections of a direction that is
-/// perpendicular to the axis and parallel in both bodies in the reference configuration.
+/// Angle of the second body against the first about an axis: the sum of the turns between them where all are about it, however
+/// far; else that between the projections of a direction that is perpendicular to the axis and parallel in both bodies in the
+/// reference configuration, up to half a turn.
 fn about_axis(
     graph: &mut Graph,
     tree: &Tree,
@@ -149,18 +150,64 @@ fn about_axis(
     let links = bodies.map(|body| tree.seat(graph, body).link);
     let [first, second] = links.map(|link| kinematics::orientation(graph, frames, link));
     let carrier = kinematics::orientation(graph, frames, seat.link);
-    let angle_of = |graph: &mut Graph, orientation: Matrix| {
-        let turned = vector::apply(graph, orientation, across);
-        let plane = [across, beyond].map(|v| vector::apply(graph, carrier, v));
-        kinematics::angle(graph, plane, turned)
+    let drawn_axis = {
+        let axis = vector::constant(graph, direction.axis);
+        vector::apply(graph, seat.rotation, axis)
     };
-    let angles = [first, second].map(|orientation| angle_of(graph, orientation));
-    let coordinate = graph.subtract(angles[1], angles[0]);
+    let coordinate = match links.map(|link| turns_about(graph, tree, link, drawn_axis)) {
+        [Some(first), Some(second)] => graph.subtract(second, first),
+        _ => {
+            let plane = [across, beyond].map(|v| vector::apply(graph, carrier, v));
+            let projected = [first, second].map(|orientation| {
+                let turned = vector::apply(graph, orientation, across);
+                plane.map(|direction| vector::dot(graph, direction, turned))
+            });
+            angle_between(graph, projected)
+        }
+    };
     let [slow, fast] = links.map(|link| kinematics::angular_velocity(graph, frames, link));
     let relative = vector::subtract(graph, fast, slow);
     let rate = vector::dot(graph, axis, relative);
     let wrenches = opposite_moments(graph, frames, links, axis);
     ForceGeometry { coordinate, rate, effect: Effect::Links(wrenches) }
+}
+
+/// The angle from one plane vector to another.
+fn angle_between(graph: &mut Graph, [from, to]: [[Node; 2]; 2]) -> Node {
+    let product = |graph: &mut Graph, a: [Node; 2], b: [Node; 2]| {
+        let (first, second) = (graph.multiply(a[0], b[0]), graph.multiply(a[1], b[1]));
+        (first, second)
+    };
+    let (xx, yy) = product(graph, from, to);
+    let (xy, yx) = product(graph, from, [to[1], to[0]]);
+    let (along, across) = (graph.add(xx, yy), graph.subtract(xy, yx));
+    graph.binary(Binary::Atan2, across, along)
+}
+
+/// The sum of the coordinates by which a frame has turned about a constant axis; `None` where something turns it otherwise.
+fn turns_about(graph: &mut Graph, tree: &Tree, mut link: Option<usize>, axis: Vector) -> Option<Node> {
+    let mut sum = graph.constant(0.0);
+    while let Some(at) = link {
+        let own = &tree.links[at];
+        match (&own.coordinate, own.axis) {
+            (Coordinate::Weld, _) | (Coordinate::Free { .. } | Coordinate::Prescribed { .. }, Axis::Shift(_)) => {}
+            (coordinate, Axis::Turn(about)) => {
+                let position = match coordinate {
+                    Coordinate::Free { symbols, .. } => graph.variable(symbols.position),
+                    Coordinate::Prescribed { motion, .. } => motion[0],
+                    _ => return None,
+                };
+                let same = vector::dot(graph, about, axis);
+                let factor = graph.constant_value(same).filter(|cosine| (cosine.abs() - 1.0).abs() < PARALLEL)?;
+                let factor = graph.constant(factor.signum());
+                let turned = graph.multiply(factor, position);
+                sum = graph.add(sum, turned);
+            }
+            _ => return None,
+        }
+        link = own.predecessor;
+    }
+    Some(sum)
 }
 
 /// A unit moment about `axis` (ground axes) on the second link, reversed on the first.
@@ -219,6 +266,9 @@ fn between_points(
     let effect = pulling(graph, frames, ends, direction);
     Ok(ForceGeometry { coordinate, rate, effect })
 }
+
+/// Axes whose cosine differs from one by less are parallel.
+const PARALLEL: f64 = 1e-12;
 
 /// Distances below this, m, count as none: there an element without direction pulls nowhere.
 const POINT_SIZE: f64 = 1e-9;

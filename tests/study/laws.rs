@@ -280,6 +280,26 @@ fn a_torsion_spring_swings_with_its_frequency() {
     }
 }
 
+/// Between two shafts that turn on and on: the twist is that of the two flywheels against each other, not cut at half a turn.
+#[test]
+fn a_torsion_spring_between_turning_shafts_sees_the_twist_alone() {
+    let study = study(
+        "study s\nbody a { mass = 1 kg, inertia = 0.5 kg*m^2 }\nbody b { mass = 1 kg, inertia = 0.5 kg*m^2 }\n\
+         joint p: revolute(z) ground -> a\njoint q: revolute(-z) ground -> b\n\
+         force f: spring a -> b about z { stiffness = 8 N*m/rad }\nmeasure twist [rad] = f.elongation\n\
+         manoeuvre m { start = rest { p.velocity = 10.2 rad/s, q.velocity = -9.8 rad/s }, for 3 s }\n\
+         solver { tolerance = 1e-10 }",
+    );
+    let record = excitation(&study, 0, STEP);
+    let compiled = Compiled::new(study).unwrap_or_else(|findings| panic!("{findings:?}"));
+    let twist = simulate(&compiled, &record, &[], Gradient::None).unwrap_or_else(|f| panic!("{f}")).channels.remove(0);
+    let frequency = 32_f64.sqrt();
+    for (k, twist) in twist.iter().enumerate() {
+        let expected = -0.4 / frequency * (frequency * k as f64 * STEP).sin();
+        assert!((twist - expected).abs() < 1e-7, "{k}: {twist} {expected}");
+    }
+}
+
 /// Every law says where it comes from, and its source is in the bibliography.
 #[test]
 fn laws_have_sources() {
