@@ -97,6 +97,7 @@ pub(super) fn equation(compiled: &Compiled, records: &[&Record], settings: &Sett
     };
     let mut fitted = finish(estimate, weighting, &problem, vec![cost], found.steps);
     (fitted.error, fitted.equation) = (ErrorDefinition::Equation, Some(found));
+    fitted.prior_rows = prior_rows(&compiled.study);
     Ok(fitted)
 }
 

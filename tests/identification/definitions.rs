@@ -1,12 +1,14 @@
 //! Other definitions of the error, each where the output error does worse.
 
+use crate::kicked::kicked;
 use crate::shipped::{compiled, loaded};
 use ident::fit::Control;
 use ident::identify::{Fitted, Settings, confidence, equation_error, fit, profiles};
 use ident::simulation::{Compiled, Gradient, Record, prepare, simulate};
 use ident::statistics::NormalStream;
-use ident::study::{self, ErrorDefinition};
+use ident::study::{self, ErrorDefinition, Prior};
 use rayon::prelude::*;
+use std::cell::RefCell;
 
 /// A study in a folder of its own, with one record of the channel `x` in m.
 fn with_record(text: &str, step: f64, x: &[f64]) -> (Compiled, Record) {
@@ -49,30 +51,14 @@ fn self_excited(c: f64, mu: f64) -> String {
     SELF_EXCITED.replace("START_C", &c.to_string()).replace("START_MU", &mu.to_string())
 }
 
-/// x'' = mu (1 - x^2) x' - c x + s w, measured with noise: the drift by classical Runge-Kutta, the kicks by Euler and Maruyama,
-/// 20 steps per sample.
+/// x'' = mu (1 - x^2) x' - c x + s w, measured with noise.
 fn wobble(c: f64, mu: f64, process: f64, noise: f64, samples: usize, step: f64, seed: u64) -> Vec<f64> {
     const SUBSTEPS: usize = 20;
-    let h = step / SUBSTEPS as f64;
-    let mut stream = NormalStream::new(seed, 3);
+    let stream = RefCell::new(NormalStream::new(seed, 3));
     let rates = |[x, v]: [f64; 2]| [v, mu * (1.0 - x * x) * v - c * x];
-    let mut state = [0.5, 0.0];
-    let mut samples_taken = Vec::new();
-    for k in 0..samples {
-        for _ in 0..if k == 0 { 0 } else { SUBSTEPS } {
-            let moved = |rate: [f64; 2], h: f64| [state[0] + h * rate[0], state[1] + h * rate[1]];
-            let a = rates(state);
-            let b = rates(moved(a, 0.5 * h));
-            let c = rates(moved(b, 0.5 * h));
-            let d = rates(moved(c, h));
-            (0..2).for_each(|i| state[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
-            if process > 0.0 {
-                state[1] += process * h.sqrt() * stream.normal();
-            }
-        }
-        samples_taken.push(state[0] + noise * stream.normal());
-    }
-    samples_taken
+    let steps = (SUBSTEPS, step / SUBSTEPS as f64);
+    let states = kicked(rates, [0.5, 0.0], process, steps, || stream.borrow_mut().normal());
+    states.take(samples).map(|state| state[0] + noise * stream.borrow_mut().normal()).collect()
 }
 
 /// Without noise the equations of motion give the parameters: in one linear step where they are linear (mass known), in a few
@@ -95,6 +81,33 @@ fn equation_error_is_exact_without_noise() {
     for (value, truth) in one.theta.iter().zip(&truth[1..]) {
         assert!((value / truth - 1.0).abs() < 1e-3, "{:?}", one.theta);
     }
+}
+
+/// A prior is one more row beside equations of variance one. It pulls by its share of what is known, so that the estimates with a
+/// prior at d + s and d - s lie as far apart as a normal prior of that width says: with v the variance without prior,
+/// 2 s v / (v + s^2). A wide prior changes nothing, a narrow one decides.
+#[test]
+fn equation_error_weighs_priors() {
+    let (base, records) = compiled(&loaded("spring_slide"));
+    let record = records[0].part(0..records[0].sample_count().min(1500), "noisy");
+    let start: Vec<f64> = base.study.parameters.iter().map(|parameter| parameter.start).collect();
+    let free = equation_error(&base, &[&record], &start).expect("all states are measured").theta[2];
+    let with = |mean: f64, standard_deviation: f64| {
+        let mut study = base.study.clone();
+        study.parameters[2].prior = Some(Prior { mean, standard_deviation });
+        let compiled = Compiled::new(study).expect("a mechanism");
+        equation_error(&compiled, &[&record], &start).expect("all states are measured").theta[2]
+    };
+    assert!((with(2.0 * free, 1e4 * free) / free - 1.0).abs() < 1e-3, "{free}");
+    assert!((with(1.2 * free, 1e-6 * free) / free - 1.2).abs() < 1e-3, "{free}");
+    // Two widths tell the variance twice.
+    let variance = |s: f64| {
+        let share = (with(free + s, s) - with(free - s, s)) / (2.0 * s);
+        s * s * share / (1.0 - share)
+    };
+    let width = variance(0.02 * free).sqrt();
+    let again = variance(2.0 * width).sqrt();
+    assert!(width > 0.0 && (again / width - 1.0).abs() < 0.1, "{width} {again}");
 }
 
 /// The tyre's deflection is not measured by `quarter_vehicle`: the refusal names states.

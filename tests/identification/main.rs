@@ -3,6 +3,8 @@
 mod combination;
 mod coverage;
 mod definitions;
+#[path = "../truth/kicked.rs"]
+mod kicked;
 mod nuisance;
 mod plan;
 #[path = "../support/repeated.rs"]

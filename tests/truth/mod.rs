@@ -10,6 +10,7 @@
 pub mod crane_pendulum;
 pub mod effect;
 pub mod excitation;
+pub mod kicked;
 pub mod mechanism;
 pub mod quarter_vehicle;
 pub mod random;

@@ -1,5 +1,6 @@
 //! A towed wheel that swivels by itself while a rough road pushes it at random: noise in the process, not only in the measurement.
 
+use super::kicked::kicked;
 use super::random::Random;
 use super::record::Record;
 
@@ -21,28 +22,14 @@ fn rates([angle, rate]: [f64; 2]) -> [f64; 2] {
     [rate, (tyre - ALIGNMENT * angle) / INERTIA]
 }
 
-/// The drift by classical Runge-Kutta, the road by Euler and Maruyama.
 pub fn towing(seed: u64) -> Record {
     let mut road = Random::new(seed);
     let mut noise = Random::new(seed ^ 0x05EE_D0F4_015E);
     let h = 1.0 / (SAMPLING * SUBSTEPS as f64);
-    let mut state = [START, 0.0];
-    let (mut time, mut measured, mut noise_free) = (vec![], vec![], vec![]);
-    for k in 0..SAMPLES {
-        for _ in 0..if k == 0 { 0 } else { SUBSTEPS } {
-            let moved = |rate: [f64; 2], h: f64| [state[0] + h * rate[0], state[1] + h * rate[1]];
-            let a = rates(state);
-            let b = rates(moved(a, 0.5 * h));
-            let c = rates(moved(b, 0.5 * h));
-            let d = rates(moved(c, h));
-            (0..2).for_each(|i| state[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
-            state[1] += ROAD / INERTIA * h.sqrt() * road.normal();
-        }
-        let swivel = state[0].to_degrees();
-        time.push((k as f64 / SAMPLING * 1e6).round() / 1e6);
-        measured.push(((swivel + NOISE * noise.normal()) * 1e4).round() / 1e4);
-        noise_free.push(swivel);
-    }
+    let states = kicked(rates, [START, 0.0], ROAD / INERTIA, (SUBSTEPS, h), || road.normal());
+    let noise_free: Vec<f64> = states.take(SAMPLES).map(|state| state[0].to_degrees()).collect();
+    let time = (0..SAMPLES).map(|k| (k as f64 / SAMPLING * 1e6).round() / 1e6).collect();
+    let measured = noise_free.iter().map(|swivel| ((swivel + NOISE * noise.normal()) * 1e4).round() / 1e4).collect();
     Record {
         heads: vec!["t [s]".to_owned(), "swivel [deg]".to_owned()],
         columns: vec![time, measured],

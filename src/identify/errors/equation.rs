@@ -4,12 +4,12 @@
 //! parts, so that no rate has to be differentiated from samples (Shinbrot-1957). Noise in the states biases the result; it is a
 //! start for the other definitions, or an answer where the measurements are very clean.
 
-use super::super::fitting::bounds;
+use super::super::fitting::{bounds, prior_rows};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::fit::{Control, EvaluationFailure, LeastSquares, Options, levenberg_marquardt};
+use crate::fit::{Control, EvaluationFailure, LeastSquares, Options, WithPriors, levenberg_marquardt};
 use crate::linear::least_squares;
 use crate::mechanics::VariableKind;
-use crate::signal::Interpolant;
+use crate::signal::{Interpolant, effective_count};
 use crate::simulation::{Compiled, Record, Stretches, stretches_refused};
 use crate::study::Interpolation;
 
@@ -31,7 +31,8 @@ pub struct EquationFit {
     pub steps: usize,
 }
 
-/// Parameters by equation error, from `start` where the equations are not linear in them.
+/// Parameters by equation error, from `start` where the equations are not linear in them. The study's priors count beside the
+/// equations as further rows, which are then weighted by their own scatter about a first solution without priors.
 ///
 /// # Errors
 /// Why the definition does not fit: states that are not measured, loops, records without a start.
@@ -52,8 +53,16 @@ pub fn equation_error(compiled: &Compiled, records: &[&Record], start: &[f64]) -
     let start: Vec<f64> = (0..start.len()).map(|j| start[j].clamp(bounds.lower[j], bounds.upper[j])).collect();
     let linear = problem.is_linear(&start, &bounds.lower, &bounds.upper);
     let options = Options { initial_radius: 1e3, ..Options::default() };
-    let estimate = levenberg_marquardt(&mut problem, &start, &bounds, &options, &mut |_| Control::Continue)
-        .map_err(|error| refuse(error.to_string()))?;
+    let search = |problem: &mut WithPriors<'_, &mut Equations>, start: &[f64]| {
+        levenberg_marquardt(problem, start, &bounds, &options, &mut |_| Control::Continue)
+            .map_err(|error| refuse(error.to_string()))
+    };
+    let mut estimate = search(&mut WithPriors { problem: &mut problem, rows: &[] }, &start)?;
+    let priors = prior_rows(&compiled.study);
+    if !priors.is_empty() {
+        problem.weigh(&estimate.residual, estimate.theta.len());
+        estimate = search(&mut WithPriors { problem: &mut problem, rows: &priors }, &estimate.theta)?;
+    }
     Ok(EquationFit { theta: estimate.theta, linear, steps: if linear { 1 } else { estimate.iterations } })
 }
 
@@ -171,8 +180,7 @@ impl Equations<'_> {
             let (reach, step) = (reach(samples), record.sample_step());
             let test = TestFunction::new(reach, step);
             for i in (0..n).filter(|&i| self.scales[i] > 0.0) {
-                let mut first = 0;
-                while first + 2 * reach < samples {
+                for first in windows(samples) {
                     let window = first..first + 2 * reach + 1;
                     let weak = |value: &dyn Fn(usize) -> f64, weights: &[f64]| -> f64 {
                         window.clone().zip(weights).map(|(k, weight)| weight * value(k)).sum::<f64>() / self.scales[i]
@@ -181,11 +189,33 @@ impl Equations<'_> {
                     for (j, column) in gradient.iter_mut().enumerate() {
                         column.push(-weak(&|k| along[k].1[j * n + i], &test.values));
                     }
-                    first += (reach / 2).max(1);
                 }
             }
         }
         (residual, gradient)
+    }
+
+    /// Scales every state's equation to residuals of variance one, by `residual` at a solution with `fitted` parameters. Windows
+    /// overlap: rows count as many as are independent.
+    fn weigh(&mut self, residual: &[f64], fitted: usize) {
+        let freedom = (residual.len() as f64 / (residual.len().saturating_sub(fitted)).max(1) as f64).sqrt();
+        let used: Vec<usize> = (0..self.scales.len()).filter(|&i| self.scales[i] > 0.0).collect();
+        let mut rows: Vec<Vec<f64>> = vec![Vec::new(); self.scales.len()];
+        let mut rest = residual;
+        for record in self.records {
+            let count = windows(record.sample_count()).count();
+            for &i in &used {
+                let (own, further) = rest.split_at(count.min(rest.len()));
+                rows[i].extend_from_slice(own);
+                rest = further;
+            }
+        }
+        for i in used {
+            let squares: f64 = rows[i].iter().map(|value| value * value).sum();
+            let deviation = (squares / effective_count(&rows[i]).max(1.0)).sqrt() * freedom;
+            // Equations that hold exactly outweigh any prior.
+            self.scales[i] *= deviation.max(f64::EPSILON);
+        }
     }
 
     /// Root mean square of the parameters' part of every state's rate over the bounds.
@@ -240,6 +270,12 @@ impl LeastSquares for Equations<'_> {
 /// Samples of a test function to each side of its middle.
 fn reach(samples: usize) -> usize {
     (samples / WINDOWS).max(SHORTEST).min(samples.saturating_sub(1) / 2)
+}
+
+/// First samples of the windows of a record.
+fn windows(samples: usize) -> impl Iterator<Item = usize> {
+    let reach = reach(samples);
+    (0..samples.saturating_sub(2 * reach)).step_by((reach / 2).max(1))
 }
 
 /// (1 - s^2)^q and its derivative by time at the samples of a window, times the sampling step (trapezoidal rule).
