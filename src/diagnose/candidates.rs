@@ -44,6 +44,9 @@ pub(super) struct Unknown {
     pub lower: f64,
     pub upper: f64,
     pub neutral: f64,
+    /// Standard deviation of a prior about the neutral value. Points of a free curve have one: what the curve shares with other
+    /// parameters (its mean slope with a stiffness) stays with those.
+    pub prior: Option<f64>,
     pub role: UnknownRole,
 }
 
@@ -70,9 +73,12 @@ impl Candidate {
         for (unknown, &value) in self.unknowns.iter().zip(values) {
             let unit = Unit::coherent(unknown.dimension);
             let quantity = |value: f64| unit.format(value, DIGITS);
+            let prior = unknown.prior.map_or(String::new(), |deviation| {
+                format!(" prior {} +- {}", quantity(unknown.neutral), quantity(deviation))
+            });
             let _ = writeln!(
                 text,
-                "    {} in {} .. {} from {}",
+                "    {} in {} .. {} from {}{prior}",
                 unknown.target,
                 quantity(unknown.lower),
                 quantity(unknown.upper),
@@ -116,22 +122,36 @@ impl Candidate {
 
 /// All candidates for `study`, in order of catalogue and place. `typical` holds one entry per place.
 pub(super) fn candidates(study: &Study, typical: &[Typical]) -> Vec<Candidate> {
-    let mut list = Vec::new();
-    for effect in &study.effects {
-        for (place, typical) in study.places.iter().zip(typical) {
-            if effect.fits(place) && !stands_at_joint(study, effect, place) {
-                list.extend(effect_candidate(study, effect, place, typical));
-            }
-        }
-    }
+    let mut list = at_all_places(study, typical, |effect| !effect.is_unnamed());
     list.extend(study.constants.iter().filter_map(|constant| freed_constant(study, constant)));
     list
 }
 
-/// Names of the candidates that [`stands_at_joint`] leaves out in favour of this one.
+/// Forces of free shape at all places.
+pub(super) fn unnamed(study: &Study, typical: &[Typical]) -> Vec<Candidate> {
+    at_all_places(study, typical, EffectDeclaration::is_unnamed)
+}
+
+fn at_all_places(study: &Study, typical: &[Typical], wanted: impl Fn(&EffectDeclaration) -> bool) -> Vec<Candidate> {
+    let mut list = Vec::new();
+    for effect in study.effects.iter().filter(|effect| wanted(effect)) {
+        for (place, typical) in study.places.iter().zip(typical) {
+            let elsewhere = stands_at_joint(study, effect, place) || stands_beside(study, effect, place).is_some();
+            if effect.fits(place) && !elsewhere {
+                list.extend(effect_candidate(study, effect, place, typical));
+            }
+        }
+    }
+    list
+}
+
+/// Names of the candidates that [`stands_at_joint`] and [`stands_beside`] leave out in favour of this one.
 fn aliases(study: &Study, effect: &EffectDeclaration, place: &Place) -> Vec<String> {
     if place.kind != PlaceKind::Joint {
-        return Vec::new();
+        let beside = |other: &&Place| {
+            effect.fits(other) && stands_beside(study, effect, other).is_some_and(|first| first.name == place.name)
+        };
+        return study.places.iter().filter(beside).map(|other| format!("{} at {}", effect.name, other.name)).collect();
     }
     let same = |force: &&crate::study::Force| study.axis_of(force).is_some_and(|axis| axis.name == place.name);
     let fitting =
@@ -144,6 +164,21 @@ fn stands_at_joint(study: &Study, effect: &EffectDeclaration, place: &Place) -> 
     let on_joint =
         study.forces.iter().any(|force| force.name == place.name && matches!(force.place, ForcePlace::Joint { .. }));
     on_joint && effect.kinds.contains(&PlaceKind::Joint)
+}
+
+/// What an effect adds to one of several elements between the same points is the same force at each: the first of them, where it
+/// is not this one.
+fn stands_beside<'a>(study: &'a Study, effect: &EffectDeclaration, place: &Place) -> Option<&'a Place> {
+    if place.kind != PlaceKind::Force || !effect.replaces.is_empty() {
+        return None;
+    }
+    let at = |name: &str| study.forces.iter().find(|force| force.name == name).map(|force| force.place);
+    let own = at(&place.name)?;
+    let first = study
+        .places
+        .iter()
+        .find(|other| other.kind == PlaceKind::Force && effect.fits(other) && at(&other.name) == Some(own))?;
+    (first.name != place.name).then_some(first)
 }
 
 fn effect_candidate(study: &Study, effect: &EffectDeclaration, place: &Place, typical: &Typical) -> Option<Candidate> {
@@ -230,6 +265,7 @@ fn amplitude(element: &str, parameter: &EffectParameter, place: &Place, typical:
         lower,
         upper,
         neutral: parameter.neutral,
+        prior: scale.filter(|_| parameter.unnamed),
         role,
     })
 }
@@ -259,6 +295,7 @@ fn shape(element: &str, parameter: &EffectParameter, place: &Place, typical: &Ty
         lower,
         upper,
         neutral: parameter.neutral,
+        prior: None,
         role,
     })
 }
@@ -280,6 +317,7 @@ fn freed_constant(study: &Study, constant: &crate::study::Constant) -> Option<Ca
             lower: ends[0].min(ends[1]),
             upper: ends[0].max(ends[1]),
             neutral: constant.value,
+            prior: None,
             role: UnknownRole::Amplitude,
         }],
         change: String::new(),

@@ -17,6 +17,9 @@ const SHOWN: usize = 20;
 /// An effect whose sensitivity keeps less than this share beside the fitted parameters cannot be judged.
 const MINIMUM_VISIBILITY: f64 = 0.02;
 
+/// Causes at one place from here on make a curve, not a cause.
+const PATCHWORK: usize = 3;
+
 /// What was done so far.
 #[derive(Default)]
 pub(super) struct Course {
@@ -32,6 +35,8 @@ pub(super) struct Course {
     ambiguous: bool,
     /// Which tests would tell rivals apart.
     telling: Vec<String>,
+    /// What else the search has to say.
+    pub remarks: Vec<String>,
     /// Shape parameters of accepted effects.
     shapes: Vec<String>,
     cannot_judge: Vec<String>,
@@ -40,6 +45,27 @@ pub(super) struct Course {
 impl Course {
     pub(super) fn accepted(&self) -> usize {
         self.texts.len()
+    }
+
+    /// The place at which so many causes were accepted one after the other that they are pieces of a curve.
+    pub(super) fn crowded(&self) -> Option<String> {
+        let places = self.steps.iter().filter_map(|step| Some(&step.ranking[step.accepted?].place));
+        let places: Vec<&String> = places.collect();
+        let crowded = |place: &&&String| places.iter().filter(|other| *other == *place).count() >= PATCHWORK;
+        places.iter().find(crowded).map(|place| (*place).clone())
+    }
+
+    /// Takes back all that was accepted: `curve` explains more by itself.
+    pub(super) fn withdraw(&mut self, curve: &str) {
+        for step in self.steps.iter_mut().filter(|step| step.accepted.is_some()) {
+            step.accepted = None;
+            step.judgement = format!("{}; withdrawn, since {curve} alone explains more", step.judgement);
+        }
+        self.texts.clear();
+        self.telling.clear();
+        self.shapes.clear();
+        self.ambiguous = false;
+        self.limit_reached = false;
     }
 
     /// Notes a round. `chosen` indexes `judged`.
@@ -98,7 +124,7 @@ impl Course {
         // A shape at the end of its grid range (a creep velocity too small to be resolved) is no structural error.
         remarks
             .retain(|remark| !self.shapes.iter().any(|shape| remark.starts_with(&format!("{shape} is at its bound"))));
-        remarks.extend(self.telling.iter().cloned());
+        remarks.extend(self.telling.iter().chain(&self.remarks).cloned());
         if compiled.study.solver.error != ErrorDefinition::Output {
             remarks.push(format!(
                 "the study asks for the {} error; causes are looked for with the output error, to which noise in the process looks like one",
@@ -160,9 +186,15 @@ impl Course {
                  sensor's noise.",
                 level(base)
             ),
-            Verdict::CauseNamed | Verdict::ShapeWithoutName => {
+            Verdict::CauseNamed => {
                 format!("Missing: {}. Discrepancy {} -> {}.", named.join(", then "), level(base), level(extended))
             }
+            Verdict::ShapeWithoutName => format!(
+                "Missing: {}. No law of the catalogue has its shape, which is drawn below. Discrepancy {} -> {}.",
+                named.join(", then "),
+                level(base),
+                level(extended)
+            ),
             Verdict::GroupOfCauses => {
                 let groups: Vec<String> = self
                     .steps

@@ -53,16 +53,26 @@ impl Judged {
 impl<'a> HeldOut<'a> {
     /// `None` where there are no held-out records or the current model cannot simulate them.
     pub(super) fn new(compiled: &Compiled, fitted: &Fitted, records: &[&'a Record]) -> Option<Self> {
+        Self::with_weights(compiled, fitted, &fitted.weighting.weights, records)
+    }
+
+    /// The same, weighted as another model's fit.
+    pub(super) fn with_weights(
+        compiled: &Compiled,
+        fitted: &Fitted,
+        weights: &[f64],
+        records: &[&'a Record],
+    ) -> Option<Self> {
         if records.is_empty() {
             return None;
         }
-        let residual = held_out_residual(compiled, fitted, &fitted.weighting.weights, records)?;
-        let magnitudes = mean_free_squares(compiled, records, &fitted.weighting.weights);
+        let residual = held_out_residual(compiled, fitted, weights, records)?;
+        let magnitudes = mean_free_squares(compiled, records, weights);
         Some(Self { records: records.to_vec(), residual, magnitudes })
     }
 
     /// Relative change of the held-out sum of squares with its interval; `None` where there is nothing to compare.
-    fn change(&self, residual: &[f64]) -> Option<ErrorChange> {
+    pub(super) fn change(&self, residual: &[f64]) -> Option<ErrorChange> {
         let mut records = Vec::new();
         let mut offset = 0;
         for record in &self.records {
@@ -80,7 +90,7 @@ impl<'a> HeldOut<'a> {
     }
 
     /// Discrepancy index of the held-out records, %.
-    pub(super) fn discrepancy(&self, residual: &[f64]) -> f64 {
+    fn discrepancy(&self, residual: &[f64]) -> f64 {
         100.0 * squares(residual) / self.magnitudes
     }
 }
@@ -89,7 +99,12 @@ fn squares(values: &[f64]) -> f64 {
     values.iter().map(|value| value * value).sum()
 }
 
-fn held_out_residual(compiled: &Compiled, fitted: &Fitted, weights: &[f64], records: &[&Record]) -> Option<Vec<f64>> {
+pub(super) fn held_out_residual(
+    compiled: &Compiled,
+    fitted: &Fitted,
+    weights: &[f64],
+    records: &[&Record],
+) -> Option<Vec<f64>> {
     let filters = prefilters(compiled, records).ok()?;
     let mut problem = Problem::new(compiled, records.to_vec(), filters, weights.to_vec());
     problem.residual(&fitted.theta).ok()

@@ -19,6 +19,7 @@ mod round;
 mod screen;
 mod telling;
 mod typical;
+mod unnamed;
 
 pub use answer::*;
 
@@ -93,16 +94,21 @@ pub fn diagnose(
     let study = study::check(loaded, Some(&options.variant))?.study;
     let compiled = Compiled::new(study)?;
     let roles = Roles::assign(records);
-    let mut model = first_model(loaded, &options.variant, compiled, &roles, observer)?;
-    let base = identification(&model.compiled, &model.fitted, &roles.all());
-    let anatomy = anatomy::anatomy(&model.compiled, &model.fitted, &roles.estimation());
+    let first = first_model(loaded, &options.variant, compiled, &roles, observer)?;
+    let base = identification(&first.compiled, &first.fitted, &roles.all());
+    let anatomy = anatomy::anatomy(&first.compiled, &first.fitted, &roles.estimation());
     let mut course = Course::default();
+    let (mut named, mut model) = (Vec::new(), first);
     while course.accepted() < options.maximum_extensions {
-        match extend(&model, &roles, &mut course, observer)? {
-            Some(next) => model = next,
-            None => break,
-        }
+        let Some(next) = extend(&model, &roles, &mut course, observer)? else { break };
+        named.push(std::mem::replace(&mut model, next));
         course.limit_reached = course.accepted() == options.maximum_extensions;
+    }
+    if options.maximum_extensions > 0 {
+        let start = named.first().unwrap_or(&model);
+        if let Some(curve) = unnamed::unnamed(start, &model, &roles, &mut course, observer)? {
+            model = curve;
+        }
     }
     let source = missing_force::Source {
         compiled: &model.compiled,

@@ -21,6 +21,9 @@ const KINDS: [(&str, PlaceKind); 6] = [
     ("signal", PlaceKind::Signal),
 ];
 
+/// What may stand behind an amplitude.
+const FLAGS: [&str; 3] = ["one_sided", "finite", "unnamed"];
+
 /// The word by which declarations name a kind of place.
 pub(super) fn kind_word(kind: PlaceKind) -> &'static str {
     KINDS.iter().find(|(_, other)| *other == kind).map_or("place", |(word, _)| word)
@@ -144,16 +147,16 @@ impl<'a> Checker<'a> {
                 .help("write `in LOWER .. UPPER`, or `in 0.01 .. 1 of rate` relative to what is typical at the place");
             return self.fail(diagnostic, SCOPE);
         }
-        let mut flags = [false; 2];
+        let mut flags = [false; FLAGS.len()];
         for flag in &declared.flags {
-            match ["one_sided", "finite"].iter().position(|known| *known == flag.text) {
+            match FLAGS.iter().position(|known| *known == flag.text) {
                 Some(at) => flags[at] = true,
                 None => {
                     let message = format!("there is no property `{}`", flag.text);
                     let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, message)
                         .label(flag.span, "not known")
-                        .suggest(similar_name(&flag.text, ["one_sided", "finite"]))
-                        .note("properties: one_sided, finite");
+                        .suggest(similar_name(&flag.text, FLAGS))
+                        .note(format!("properties: {}", FLAGS.join(", ")));
                     return self.fail(diagnostic, SCOPE);
                 }
             }
@@ -175,6 +178,7 @@ impl<'a> Checker<'a> {
             one_sided: flags[0],
             neutral,
             finite_only: flags[1],
+            unnamed: flags[2],
             unit: unit.and_then(|unit| read_unit(unit).ok()),
         })
     }

@@ -212,7 +212,7 @@ pub struct Declared {
     pub range: Option<(Expression, Expression)>,
     /// `of rate`: the range is relative to the place's typical magnitude of this quantity.
     pub range_of: Option<Name>,
-    /// Words after the declaration: `one_sided`, `finite`.
+    /// Words after the declaration: `one_sided`, `finite`, `unnamed`.
     pub flags: Vec<Name>,
     /// `neutral 1`
     pub neutral: Option<Expression>,

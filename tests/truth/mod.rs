@@ -11,6 +11,7 @@ pub mod crane_pendulum;
 pub mod effect;
 pub mod excitation;
 pub mod kicked;
+pub mod magnet;
 pub mod mechanism;
 pub mod quarter_vehicle;
 pub mod random;

@@ -28,7 +28,7 @@ pub struct Point {
 }
 
 /// Body index, `None` for ground; and the position in that body's axes (m).
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attachment {
     pub body: Option<usize>,
     pub position: [Node; 3],
@@ -159,7 +159,7 @@ pub struct Force {
     pub span: Span,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ForcePlace {
     /// Along or about one axis of a joint; elongation = the axis' coordinate.
     Joint { joint: usize, axis: usize },

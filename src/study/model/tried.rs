@@ -72,6 +72,11 @@ pub struct EffectDeclaration {
 }
 
 impl EffectDeclaration {
+    /// A shape that no law describes: tried only where the named effects leave something.
+    pub fn is_unnamed(&self) -> bool {
+        self.amplitudes.iter().any(|amplitude| amplitude.unnamed)
+    }
+
     /// Whether the effect can act at this place of the study.
     pub fn fits(&self, place: &Place) -> bool {
         self.kinds.contains(&place.kind)
@@ -100,5 +105,7 @@ pub struct EffectParameter {
     pub neutral: f64,
     /// The effect is not differentiable (or not defined) at its neutral value: scan finite strengths only.
     pub finite_only: bool,
+    /// Point of a free shape, not the strength of a known cause.
+    pub unnamed: bool,
     pub unit: Option<Unit>,
 }
