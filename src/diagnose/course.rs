@@ -190,7 +190,7 @@ impl Course {
                 format!("Missing: {}. Discrepancy {} -> {}.", named.join(", then "), level(base), level(extended))
             }
             Verdict::ShapeWithoutName => format!(
-                "Missing: {}. No law of the catalogue has its shape, which is drawn below. Discrepancy {} -> {}.",
+                "Missing: {}. No law of the catalogue has its shape. Discrepancy {} -> {}.",
                 named.join(", then "),
                 level(base),
                 level(extended)
