@@ -131,6 +131,11 @@ impl Course {
                 compiled.study.solver.error.name()
             ));
         }
+        if let Some(place) = self.crowded() {
+            remarks.push(format!(
+                "several causes in a row at {place} may be pieces of one law that the catalogue does not have: see the missing force there"
+            ));
+        }
         if self.limit_reached {
             remarks.push(format!("stopped after {} extensions as asked; `--extensions N` goes on", self.accepted()));
         }

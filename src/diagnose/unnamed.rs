@@ -19,6 +19,8 @@ use rayon::prelude::*;
 
 /// A residual with fewer independent samples than this share is not noise alone.
 const NOISE_SHARE: f64 = 0.9;
+/// A search that was asked to end before so many causes may not have come to what it would name.
+const CHAIN: usize = 3;
 /// Curves refitted after the screen, and in how many iterations: beside a misfit that other parameters have bent to, the screen's linear
 /// estimate says little about a curve. The best of these are fitted to the end.
 const REFITTED: usize = 12;
@@ -33,7 +35,8 @@ pub(super) fn unnamed(
     course: &mut Course,
     observer: Observer,
 ) -> Result<Option<Model>, Vec<Diagnostic>> {
-    if course.below_visibility || !coloured(&last.fitted) && course.crowded().is_none() {
+    let is_cut_short = course.limit_reached && course.accepted() < CHAIN;
+    if course.below_visibility || is_cut_short || !coloured(&last.fitted) && course.crowded().is_none() {
         return Ok(None);
     }
     let is_extended = course.accepted() > 0;
