@@ -14,5 +14,9 @@ fn main() -> std::io::Result<()> {
         shipped.record.write(&folder.join(shipped.file))?;
         println!("{}/data/{}: {} samples", shipped.study, shipped.file, shipped.record.columns[0].len());
     }
+    for (path, text) in truth::shipped::further() {
+        std::fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("studies").join(path), text)?;
+        println!("{path}");
+    }
     Ok(())
 }

@@ -71,7 +71,7 @@ fn errors_are_told_in_an_engineers_words() {
 
 #[test]
 fn shipped_studies_are_sound() {
-    for name in ["quarter_vehicle", "two_mass", "crane_pendulum", "spring_slide", "drive_axis"] {
+    for name in ["quarter_vehicle", "two_mass", "crane_pendulum", "spring_slide", "drive_axis", "elastic_arm"] {
         let path = format!("{}/studies/{name}/{name}.ident", env!("CARGO_MANIFEST_DIR"));
         let loaded = ident::study::load(Path::new(&path));
         match check(&loaded, None) {

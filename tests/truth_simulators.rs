@@ -293,3 +293,18 @@ fn shipped_records_are_up_to_date() {
         }
     }
 }
+
+/// Likewise the modes of the elastic arm; they belong to a beam whose finite elements have the same frequencies.
+#[test]
+fn shipped_modes_are_up_to_date() {
+    for (path, text) in truth::shipped::further() {
+        let path = format!("{}/studies/{path}", env!("CARGO_MANIFEST_DIR"));
+        assert_eq!(std::fs::read_to_string(&path).expect("a shipped file is readable"), text, "{path}");
+        let own = truth::elastic_arm::frequencies_of_elements();
+        let rows = text.lines().skip(2).map(|line| line.split(',').nth(1).and_then(|cell| cell.parse::<f64>().ok()));
+        for (row, own) in rows.zip(own).take(2) {
+            let drawn = row.expect("a frequency") * truth::elastic_arm::FREQUENCY_SCALE;
+            assert!((own / drawn - 1.0).abs() < 1e-3, "{own} instead of {drawn}");
+        }
+    }
+}

@@ -4,7 +4,7 @@ use super::output::{json, show, write_whole};
 use super::session::Session;
 use super::{Failed, Format, StudyArguments};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::simulation::{Compiled, Gradient, Record, Trajectory, manoeuvre, simulate, slowness};
+use crate::simulation::{Compiled, Gradient, Record, Trajectory, fast_turning, manoeuvre, simulate, slowness};
 use std::path::PathBuf;
 
 #[derive(clap::Args, Debug)]
@@ -41,6 +41,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
             let diagnostic = Diagnostic::error(Code::SIMULATION_FAILED, failure.to_string()).help(&failure.help);
             session.fail(&[diagnostic])
         })?;
+        session.show(&fast_turning(&compiled, record, &theta));
         trajectories.push((record, trajectory));
     }
     if arguments.why_slow {

@@ -441,6 +441,15 @@ codes! {
      joints would answer with impulses of their own, which are not computed.\n\
      Model the contact as a stiff spring with damping, `force stop: spring on motor { stiffness = 1 MN*m/rad }`, or open the loop.\n"
 
+    ELASTIC_TURNS_FAST "E0316" "elastic body turns fast"
+    "Modes describe small deformations of a body at rest. In a body that turns, centrifugal forces pull it straight and make it\n\
+     stiffer (a rotor blade) or bend it further and make it softer; both grow with the square of the speed and are left out here.\n\
+     At a fifth of the lowest circular frequency they change the stiffness by some percent.\n\
+     Build such a body from several rigid ones with bending springs, which knows all of this, or simulate slower runs:\n\
+     \n\
+     \x20   for i in 1 .. 16 { joint bend[i]: revolute(z) link[i].tip -> link[i + 1] }\n\
+     \x20   for i in 1 .. 16 { force bending[i]: spring on bend[i] { stiffness = 320 N*m/rad } }\n"
+
     // ---- E04xx: data files and signals ----
 
     DATA_FILE_UNREADABLE "E0401" "data file cannot be read"

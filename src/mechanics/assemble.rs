@@ -1,12 +1,13 @@
 //! The system from its parts: states, rates, measures, starts.
 
 use super::articulated::Accelerated;
+use super::elastic::Modal;
 use super::events::Changes;
 use super::kinematics::FrameMotion;
 use super::multipliers::{Loops, algebraic_part};
 use super::scale::typical_magnitude;
 use super::starts::starts;
-use super::system::{Event, Output, StartEquation, System, Variable, VariableKind};
+use super::system::{Event, Output, StartEquation, System, TURNING, Variable, VariableKind};
 use super::topology::{Axis, Coordinate, Tree};
 use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::expression::vector::Vector;
@@ -48,7 +49,8 @@ pub(super) fn assemble(
     let values = graph.substitute(&values, meaning);
     let name_and_value = |((name, ..), value): ((&str, Node, Span), Node)| Output { name: name.to_owned(), value };
     let outputs: Vec<Output> = study.outputs().zip(values).map(name_and_value).collect();
-    let probes = probes(&mut graph, study, meaning);
+    let mut probes = probes(&mut graph, study, meaning);
+    probes.extend(turning(&mut graph, study, tree, frames));
     let events = events(&mut graph, study, &states, meaning, changes);
     let starts = all_starts(&mut graph, study, &states, meaning, &loops.closed)?;
     let (algebraic, constraints, constraint_names) = algebraic_part(&mut graph, study, &loops, &reactions);
@@ -204,6 +206,15 @@ fn probes(graph: &mut Graph, study: &Study, meaning: &HashMap<Symbol, Node>) -> 
         probe.value = value;
     }
     probes
+}
+
+/// Per elastic body how fast it turns against its lowest mode.
+fn turning(graph: &mut Graph, study: &Study, tree: &Tree, frames: &[FrameMotion]) -> Vec<Output> {
+    let of_body = |modal: &Modal| {
+        let value = modal.turning(graph, study, &frames[modal.seat()])?;
+        Some(Output { name: format!("{}.{TURNING}", study.bodies[modal.body].name), value })
+    };
+    tree.modal.iter().filter_map(of_body).collect()
 }
 
 fn all_starts(

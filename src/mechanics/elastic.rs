@@ -15,7 +15,7 @@ use super::kinematics::FrameMotion;
 use super::topology::{Axis, Coordinate, Link, Seat, Tree};
 use crate::diagnostics::Diagnostic;
 use crate::expression::vector::{self, Vector};
-use crate::expression::{Graph, Node, Symbol};
+use crate::expression::{Binary, Graph, Node, Symbol};
 use crate::study::{Body, Elastic, Study};
 
 /// The modes of one body as the tree sees them.
@@ -244,6 +244,17 @@ impl Modal {
         }
         let gravity = vector::apply_transposed(graph, frame.orientation, study.gravity);
         Wrench { moment: vector::cross(graph, displaced, gravity), force: vector::zero(graph) }
+    }
+
+    /// How fast the body turns against its lowest mode: squared ratio of angular velocity and circular frequency.
+    pub fn turning(&self, graph: &mut Graph, study: &Study, frame: &FrameMotion) -> Option<Node> {
+        let modes = study.bodies[self.body].elastic.iter().flat_map(|elastic| &elastic.modes);
+        let lowest = modes.map(|mode| mode.frequency).reduce(|a, b| graph.binary(Binary::Minimum, a, b))?;
+        let turn = graph.constant(std::f64::consts::TAU);
+        let rate = graph.multiply(turn, lowest);
+        let square = graph.multiply(rate, rate);
+        let speed = vector::dot(graph, frame.angular_velocity, frame.angular_velocity);
+        Some(graph.divide(speed, square))
     }
 
     /// Elastic and damping load on every modal coordinate, N.

@@ -6,6 +6,10 @@ use crate::quantities::Dimension;
 use crate::study::EventTrigger;
 use std::collections::HashMap;
 
+/// Name of the probe of an elastic body, behind that of the body: squared ratio of its angular velocity and its lowest circular
+/// frequency.
+pub const TURNING: &str = "turning";
+
 /// `x' = rates(t, x, w, theta)`, `0 = constraints(t, x, w, theta)`, `y = outputs(t, x, w, theta)`.
 ///
 /// Plain trees have no algebraic variables w: the accelerations are eliminated symbolically (articulated-body
@@ -36,7 +40,7 @@ pub struct System {
     /// What changes states at instants.
     pub events: Vec<Event>,
     /// Further quantities that can be evaluated along a solution: place probes in the study's order of
-    /// `places[..].probes[..]`, flattened.
+    /// `places[..].probes[..]`, flattened; then per elastic body [`TURNING`].
     pub probes: Vec<Output>,
     /// Per experiment, then per manoeuvre: start value of each state as far as given (see [`StartEquation`]), in state order.
     pub starts: Vec<Vec<StartEquation>>,

@@ -15,6 +15,7 @@ mod run;
 mod slowness;
 mod stretch;
 mod tangent;
+mod turning;
 
 pub use certificate::certify;
 pub use failure::{Detail, Failure};
@@ -24,3 +25,4 @@ pub use prepare::{Record, prepare};
 pub use run::{Compiled, Gradient, Trajectory, probe, simulate, slowness};
 pub use slowness::{Limit, Slowness};
 pub use stretch::{Observation, State, Stretch, Stretches, stretches_refused};
+pub use turning::fast_turning;

@@ -3,6 +3,7 @@
 mod combination;
 mod coverage;
 mod definitions;
+mod elastic;
 #[path = "../truth/kicked.rs"]
 mod kicked;
 mod nuisance;

@@ -224,3 +224,21 @@ fn every_example_of_the_reference_compiles() {
     }
     assert!(faults.is_empty(), "{faults}");
 }
+
+/// The fragments of README's line-by-line study are together a study that compiles.
+#[test]
+fn readmes_own_study_compiles() {
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md");
+    let blocks: Vec<&str> = text.split("```ident\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    assert!(blocks.len() >= 5, "{} fragments", blocks.len());
+    if let Err(findings) = compiled(&blocks.concat()) {
+        panic!("{findings}");
+    }
+    // Left out, every fragment is missed by the rest: none of them stands there without being read.
+    for left_out in 0..blocks.len() {
+        let rest: Vec<&str> = (0..blocks.len()).filter(|&at| at != left_out).map(|at| blocks[at]).collect();
+        let told = compiled(&rest.concat());
+        let needed = !blocks[left_out].contains("experiment ") && !blocks[left_out].contains("measure ");
+        assert_eq!(told.is_err(), needed, "without\n{}", blocks[left_out]);
+    }
+}

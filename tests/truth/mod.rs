@@ -9,6 +9,7 @@
 
 pub mod crane_pendulum;
 pub mod effect;
+pub mod elastic_arm;
 pub mod excitation;
 pub mod kicked;
 pub mod magnet;

@@ -43,5 +43,13 @@ pub fn records() -> Vec<Shipped> {
         shipped.push(Shipped { study: "series_springs", file, record });
     }
     shipped.push(Shipped { study: "caster_shimmy", file: "estimation.csv", record: super::shimmy::towing(7) });
+    for (file, seed, level) in RECORDS {
+        shipped.push(Shipped { study: "elastic_arm", file, record: super::elastic_arm::turning(seed, level) });
+    }
     shipped
+}
+
+/// Further files of shipped studies: their path, and their text.
+pub fn further() -> [(&'static str, String); 1] {
+    [("elastic_arm/arm_modes.csv", super::elastic_arm::modes(4))]
 }
