@@ -315,7 +315,7 @@ codes! {
      \n    v [m/s],F [kN]\n    -0.5,2.1\n    0,0\n"
 
     TABLE_FORM "E0253" "form of a table"
-    "A table is a function of one argument. It says how it goes between its points and beyond them:\n\
+    "A table is a function of one argument, or of two over a grid. It says how it goes between its points and beyond them:\n\
      \n    table curve(v: rate) -> load {\n      points = ((-1 m/s, 3 kN), (1 m/s, -2 kN))\n      interpolation = monotone\n\
      \x20     extrapolation = linear\n    }\n\
      \n`linear`: straight lines; `monotone`: smooth and without overshoot; `cubic`: smooth, for curves without corners. Beyond the\n\
@@ -436,10 +436,12 @@ codes! {
      \n\
      \x20   start = rest { elbow.position = 70 deg }\n"
 
-    IMPACT_IN_LOOP "E0312" "impulse in a mechanism with loops"
-    "An event that changes the rate of a force element does so by an impulse. In a mechanism with closed loops the closing\n\
-     joints would answer with impulses of their own, which are not computed.\n\
-     Model the contact as a stiff spring with damping, `force stop: spring on motor { stiffness = 1 MN*m/rad }`, or open the loop.\n"
+    IMPACT_IN_LOOP "E0312" "impulse without effect"
+    "An event that changes the rate of a force element does so by an impulse, which changes all velocities that it reaches; closing\n\
+     joints answer with impulses of their own. Here they and the prescribed motions determine the rate of the element: nothing\n\
+     can change it.\n\
+     Let the drive yield: `joint motor: revolute(y) ground -> crank` with a spring `force servo: spring_damper on motor { .. }`\n\
+     instead of `motion = ..`, or model the contact as a stiff spring with damping.\n"
 
     ELASTIC_TURNS_FAST "E0316" "elastic body turns fast"
     "Modes describe small deformations of a body at rest. In a body that turns, centrifugal forces pull it straight and make it\n\

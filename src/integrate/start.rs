@@ -5,7 +5,7 @@
 
 use super::augmented::Augmented;
 use super::problem::{Dynamics, Failure, FailureCause, Start};
-use super::structure::entries;
+use super::structure::{entries, find};
 use crate::linear::SingularValueDecomposition;
 
 const MAXIMUM_ITERATIONS: usize = 100;
@@ -105,15 +105,6 @@ fn stages<D: Dynamics + ?Sized>(system: &mut Augmented<D>, t: f64, y: &[f64], fi
         stage.columns.dedup();
     }
     [first, second].into_iter().filter(|stage| !stage.rows.is_empty()).collect()
-}
-
-/// Representative of the class of `i`.
-fn find(class: &mut [usize], mut i: usize) -> usize {
-    while class[i] != i {
-        class[i] = class[class[i]];
-        i = class[i];
-    }
-    i
 }
 
 struct Problem {

@@ -16,7 +16,8 @@ pub(super) struct Structure {
     pub is_constraint: Vec<bool>,
     /// Those rows, ascending.
     pub constraints: Vec<usize>,
-    /// Algebraic components that stand in no algebraic equation, length n.
+    /// Algebraic components that the algebraic equations alone do not determine, length n: multipliers, and what is defined
+    /// by them (a reaction that a friction depends on).
     pub is_multiplier: Vec<bool>,
     /// Some combinations of differential components are in fact algebraic: constraints tie them together, or derivatives
     /// stand in rows of other components.
@@ -43,16 +44,18 @@ impl Structure {
         let mut has_derivative = vec![false; n];
         by_derivative.iter().for_each(|&(row, ..)| has_derivative[row] = true);
         let mut has_algebraic = vec![false; n];
-        let mut in_algebraic_equation = vec![false; n];
+        let mut tied = Vec::new();
         for &(row, column) in by_y.iter().filter(|(_, column)| !differential[*column]) {
             has_algebraic[row] = true;
-            in_algebraic_equation[column] |= !has_derivative[row];
+            if !has_derivative[row] {
+                tied.push((row, column));
+            }
         }
         structure.is_constraint = (0..n).map(|row| !has_derivative[row] && !has_algebraic[row]).collect();
         structure.constraints = (0..n).filter(|&row| structure.is_constraint[row]).collect();
         if !structure.constraints.is_empty() {
             structure.has_hidden_algebraic = true;
-            structure.is_multiplier = (0..n).map(|i| !differential[i] && !in_algebraic_equation[i]).collect();
+            structure.is_multiplier = multipliers(&differential, &tied);
         }
         structure
     }
@@ -60,6 +63,38 @@ impl Structure {
     pub fn has_constraints(&self) -> bool {
         !self.constraints.is_empty()
     }
+}
+
+/// Algebraic components are multipliers unless the algebraic equations that tie them together are as many as they. `tied`:
+/// equation and component.
+fn multipliers(differential: &[bool], tied: &[(usize, usize)]) -> Vec<bool> {
+    let n = differential.len();
+    // Components first, then equations.
+    let mut group: Vec<usize> = (0..2 * n).collect();
+    for &(row, column) in tied {
+        let (a, b) = (find(&mut group, n + row), find(&mut group, column));
+        group[a] = b;
+    }
+    let mut missing = vec![0_isize; 2 * n];
+    for i in (0..n).filter(|&i| !differential[i]) {
+        missing[find(&mut group, i)] += 1;
+    }
+    let mut equations: Vec<usize> = tied.iter().map(|&(row, _)| row).collect();
+    equations.sort_unstable();
+    equations.dedup();
+    for row in equations {
+        missing[find(&mut group, n + row)] -= 1;
+    }
+    (0..n).map(|i| !differential[i] && missing[find(&mut group, i)] > 0).collect()
+}
+
+/// Representative of the group of `i`.
+pub(super) fn find(group: &mut [usize], mut i: usize) -> usize {
+    while group[i] != i {
+        group[i] = group[group[i]];
+        i = group[i];
+    }
+    i
 }
 
 /// Places of the entries of dF/dy and of dF/dy' (with their values) that differ from zero at or near a point.

@@ -16,6 +16,8 @@ pub(super) struct Assembly {
     /// Per start of the study ([`Study::starts`]), positions at which the loops are closed; the first entry stands for a study
     /// without any.
     pub positions: Vec<HashMap<Symbol, f64>>,
+    /// A closed position that is not special.
+    pub general: HashMap<Symbol, f64>,
     pub warnings: Vec<Diagnostic>,
 }
 
@@ -66,7 +68,7 @@ pub(super) fn assemble_loops(
         known.push((given, closed.clone()));
         positions.push(closed);
     }
-    let jacobian = linkage.general_jacobian(&positions[0]);
+    let (general, jacobian) = linkage.general_position(&positions[0]);
     let kept = independent_rows(&jacobian, rows);
     let freedom = linkage.freedom() - kept.len();
     let is_driven = study.joints.iter().flat_map(|joint| &joint.axes).any(|axis| axis.prescribed.is_some());
@@ -80,7 +82,7 @@ pub(super) fn assemble_loops(
         return Err(vec![contradicted(study, &rows[row])]);
     }
     warnings.extend(redundancies(study, rows, &kept));
-    Ok(Assembly { warnings, kept, positions })
+    Ok(Assembly { warnings, kept, positions, general })
 }
 
 /// Prescribed motions that the loops do not allow.

@@ -1,7 +1,8 @@
 //! What events do to the states: new values of law states, and impulses along force elements.
 //!
 //! An impulse `L` along an element changes all velocities by `da/dload L`, the accelerations being linear in loads; `L` is such that
-//! the element's rate becomes the value asked for (Pfeiffer-Glocker-1996, Poisson and Newton impacts without friction).
+//! the element's rate becomes the value asked for (Pfeiffer-Glocker-1996, Poisson and Newton impacts without friction). Joints
+//! that close loops answer with impulses of their own, such that the rates of their constraints stay as they are.
 
 use super::articulated::Accelerated;
 use super::forces::ForceGeometry;
@@ -19,7 +20,7 @@ pub(super) type Changes = Vec<(Symbol, Node)>;
 /// accelerations under other loads of the force elements.
 ///
 /// # Errors
-/// Impulses in mechanisms with closed loops.
+/// Impulses along elements to whose rate closed loops and prescribed motions leave no freedom.
 pub(super) fn changes(
     graph: &mut Graph,
     study: &Study,
@@ -29,17 +30,6 @@ pub(super) fn changes(
     loops: &Loops,
     accelerate: impl Fn(&mut Graph, &[Node]) -> Vec<Accelerated>,
 ) -> Result<Vec<Changes>, Vec<Diagnostic>> {
-    let is_impact = |event: &&Event| event.changes.iter().any(|(target, _)| matches!(target, ChangeTarget::Rate(_)));
-    if !loops.rows.is_empty()
-        && let Some(event) = study.events.iter().find(is_impact)
-    {
-        let message = format!("`{}` changes a rate at once, in a mechanism with closed loops", event.owner);
-        return Err(vec![
-            Diagnostic::error(Code::IMPACT_IN_LOOP, message)
-                .label(event.span, "the closing joints would answer with impulses")
-                .help("model the contact as a stiff spring with damping, or open the loop"),
-        ]);
-    }
     let mut result = Vec::new();
     for event in &study.events {
         let mut changed = Vec::new();
@@ -54,7 +44,11 @@ pub(super) fn changes(
                     loads[*force] = graph.add(loads[*force], added);
                     let accelerated = accelerate(graph, &loads);
                     let rate = geometries[*force].rate;
-                    changed.extend(velocities_after(graph, tree, &accelerated, impulse, (rate, value)));
+                    let after = velocities_after(graph, tree, &accelerated, loops, impulse, (rate, value));
+                    if !is_free(graph, study, loops, after.mobility) {
+                        return Err(vec![held(study, *force, event)]);
+                    }
+                    changed.extend(after.velocities);
                 }
             }
         }
@@ -63,33 +57,111 @@ pub(super) fn changes(
     Ok(result)
 }
 
+/// Share of an element's mobility that must be left by the loops.
+const FREE: f64 = 1e-9;
+
+/// Whether the loops leave the element's rate free where they are closed near the study's first start.
+fn is_free(graph: &mut Graph, study: &Study, loops: &Loops, mobility: [Node; 2]) -> bool {
+    if loops.rows.is_empty() {
+        return true;
+    }
+    let closed = &loops.general;
+    let parameter = |symbol: Symbol| study.parameters.iter().find(|p| p.symbol == symbol).map(|p| p.start);
+    let value = |symbol: Symbol| closed.get(&symbol).copied().or_else(|| parameter(symbol)).unwrap_or(0.0);
+    let [alone, left] = mobility;
+    let values = graph.evaluate(&[alone, left], value, |_, _, _| 0.0);
+    !values[0].is_finite() || values[1] > FREE * values[0]
+}
+
+fn held(study: &Study, force: usize, event: &Event) -> Diagnostic {
+    let name = &study.forces[force].name;
+    let message = format!("`{}` changes a rate at once that the closed loops determine", event.owner);
+    Diagnostic::error(Code::IMPACT_IN_LOOP, message)
+        .label(event.span, format!("no impulse along `{name}` moves anything"))
+        .help("let the drive yield, by a spring and damper instead of a prescribed motion, or take the impact out")
+}
+
+/// What an impulse does.
+struct After {
+    velocities: Changes,
+    /// Rate of the element per impulse: if the loops were open, and as they are.
+    mobility: [Node; 2],
+}
+
 /// All velocities after an impulse that brings `rate` to `value`.
+///
+/// With the rates `J v` of the element and of the constraints, the impulses `L` along them change the velocities by `M^-1 J^T L`; the
+/// matrix `J M^-1 J^T` is positive definite where the constraints leave the element's rate free, so that elimination needs no
+/// exchange of rows.
 fn velocities_after(
     graph: &mut Graph,
     tree: &Tree,
     accelerated: &[Accelerated],
+    loops: &Loops,
     impulse: Symbol,
     (rate, value): (Node, Node),
-) -> Vec<(Symbol, Node)> {
+) -> After {
     let free = tree.links.iter().zip(accelerated);
     let velocities: Changes = free.filter_map(|(link, own)| Some((link.free_symbols()?.0, own.acceleration))).collect();
     let accelerations: Vec<Node> = velocities.iter().map(|(_, acceleration)| *acceleration).collect();
-    let mobilities = graph.differentiate(&accelerations, impulse);
-    let mut mobility = graph.constant(0.0);
-    for ((velocity, _), &own) in velocities.iter().zip(&mobilities) {
-        let lever = graph.differentiate(&[rate], *velocity)[0];
-        let share = graph.multiply(lever, own);
-        mobility = graph.add(mobility, share);
+    // The element comes last: its row alone is not zero on the right.
+    let along: Vec<(Symbol, Node)> = loops.multipliers.iter().copied().zip(loops.velocities.iter().copied()).collect();
+    let along = [along, vec![(impulse, rate)]].concat();
+    let responses: Vec<Vec<Node>> =
+        along.iter().map(|&(impulse, _)| graph.differentiate(&accelerations, impulse)).collect();
+    let mut matrix: Vec<Vec<Node>> = Vec::new();
+    for &(_, rate) in &along {
+        let levers: Vec<Node> =
+            velocities.iter().map(|&(velocity, _)| graph.differentiate(&[rate], velocity)[0]).collect();
+        matrix.push(responses.iter().map(|response| sum_of_products(graph, &levers, response)).collect());
     }
     let missing = graph.subtract(value, rate);
-    let size = graph.divide(missing, mobility);
-    let moved = velocities.iter().zip(mobilities).filter(|(_, own)| !graph.is_zero(*own)).collect::<Vec<_>>();
-    moved
-        .into_iter()
-        .map(|(&(velocity, _), own)| {
-            let change = graph.multiply(own, size);
+    let alone = matrix[along.len() - 1][along.len() - 1];
+    let (impulses, left) = solve_last(graph, matrix, missing);
+    let mut changed = Vec::new();
+    for (k, &(velocity, _)) in velocities.iter().enumerate() {
+        let own: Vec<Node> = responses.iter().map(|response| response[k]).collect();
+        let change = sum_of_products(graph, &own, &impulses);
+        if !graph.is_zero(change) {
             let before = graph.variable(velocity);
-            (velocity, graph.add(before, change))
-        })
-        .collect()
+            changed.push((velocity, graph.add(before, change)));
+        }
+    }
+    After { velocities: changed, mobility: [alone, left] }
+}
+
+fn sum_of_products(graph: &mut Graph, a: &[Node], b: &[Node]) -> Node {
+    let mut sum = graph.constant(0.0);
+    for (&a, &b) in a.iter().zip(b) {
+        let product = graph.multiply(a, b);
+        sum = graph.add(sum, product);
+    }
+    sum
+}
+
+/// Solves `matrix x = (0, .., 0, last)` without exchange of rows; also the last pivot.
+fn solve_last(graph: &mut Graph, mut matrix: Vec<Vec<Node>>, last: Node) -> (Vec<Node>, Node) {
+    let n = matrix.len();
+    for k in 0..n {
+        for i in k + 1..n {
+            if graph.is_zero(matrix[i][k]) {
+                continue;
+            }
+            let factor = graph.divide(matrix[i][k], matrix[k][k]);
+            for j in k..n {
+                let share = graph.multiply(factor, matrix[k][j]);
+                matrix[i][j] = graph.subtract(matrix[i][j], share);
+            }
+        }
+    }
+    let mut solution = vec![last; n];
+    for k in (0..n).rev() {
+        let mut right = if k + 1 == n { last } else { graph.constant(0.0) };
+        for j in k + 1..n {
+            let share = graph.multiply(matrix[k][j], solution[j]);
+            right = graph.subtract(right, share);
+        }
+        solution[k] = graph.divide(right, matrix[k][k]);
+    }
+    (solution, matrix[n - 1][n - 1])
 }

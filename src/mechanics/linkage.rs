@@ -168,8 +168,8 @@ impl Linkage {
         outcome.map(|()| closed)
     }
 
-    /// The Jacobian of the constraints at a closed position that is not special: m x n, column-major.
-    pub fn general_jacobian(&mut self, closed: &HashMap<Symbol, f64>) -> Vec<f64> {
+    /// A closed position near another that is not special, and the Jacobian of the constraints there: m x n, column-major.
+    pub fn general_position(&mut self, closed: &HashMap<Symbol, f64>) -> (HashMap<Symbol, f64>, Vec<f64>) {
         let drawn = std::mem::replace(&mut self.values, closed.clone());
         self.move_aside();
         let all: Vec<usize> = (0..self.freedoms.len()).collect();
@@ -177,8 +177,7 @@ impl Linkage {
             self.values = closed.clone();
         }
         let jacobian = self.jacobian();
-        self.values = drawn;
-        jacobian
+        (std::mem::replace(&mut self.values, drawn), jacobian)
     }
 
     /// Another way to close the loops with what is given, where the position chosen is far from the start.

@@ -20,9 +20,12 @@ pub(super) struct Loops {
     pub multipliers: Vec<Symbol>,
     projections: Vec<Symbol>,
     positions: Vec<Node>,
-    velocities: Vec<Node>,
+    /// Rate of every row.
+    pub velocities: Vec<Node>,
     /// Per start of the study, where the loops are closed.
     pub closed: Vec<HashMap<Symbol, f64>>,
+    /// A closed position that is not special.
+    pub general: HashMap<Symbol, f64>,
     pub warnings: Vec<Diagnostic>,
 }
 
@@ -53,6 +56,7 @@ impl Loops {
             velocities: assembly.kept.iter().map(|&i| velocities[i]).collect(),
             rows,
             closed: assembly.positions,
+            general: assembly.general,
             warnings: assembly.warnings,
         })
     }

@@ -73,7 +73,11 @@ impl Failure {
             ),
             Cause::NotFinite => (
                 "the solution became infinite or not a number",
-                "the model is unstable with these parameters (wrong sign, missing damping, division by zero); narrow the bounds",
+                "the model is unstable with these parameters (wrong sign, missing damping, division by zero), or a table ends in `error` there; narrow the bounds",
+            ),
+            Cause::SingularMatrix if failure.component.is_some_and(|i| name(i).contains(".reaction")) => (
+                "the equations are singular",
+                "the loops branch here, or hold by a constraint that was left out as redundant at the start: give a joint of the loop more freedom (`universal`, `spherical`)",
             ),
             Cause::SingularMatrix => {
                 ("the equations are singular", "a mass, inertia or law leaves this state undetermined")

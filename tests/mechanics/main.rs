@@ -6,6 +6,7 @@ mod cases;
 mod derivatives;
 mod elastic;
 mod faults;
+mod impacts;
 mod maximal;
 mod newton_euler;
 mod pendulum;

@@ -84,3 +84,26 @@ fn every_direction_swings_by_itself() {
         }
     }
 }
+
+/// A hardening bushing at rest under a load: `F = c x + k x^3`.
+#[test]
+fn it_hardens_with_the_third_power() {
+    let text = "study s\nbody pad { mass = 1 kg }\njoint base: fixed ground -> pad\nbody b { mass = 2 kg, inertia = 0.02 kg*m^2 }\n\
+                joint free: free pad -> b\npart mount: bushing at pad, b {\n\
+                  stiffness = { x = 20 kN/m, y = 20 kN/m, z = 20 kN/m, turn_x = 9 N*m/rad, turn_y = 9 N*m/rad, turn_z = 9 N*m/rad }\n\
+                  cubic = { y = 500 MN/m^3, turn_z = 40 N*m }\n}\n\
+                force fx: external_load ground -> b along x { value = 40 N }\n\
+                force fy: external_load ground -> b along y { value = 100 N }\n\
+                force mz: external_load ground -> b about z { value = 1 N*m }\n\
+                measure x [m] = free.shift_x.position\nmeasure y [m] = free.shift_y.position\n\
+                measure c [rad] = atan2(b.axis_x.y, b.axis_x.x)\n\
+                solver { tolerance = 1e-10 }\nmanoeuvre m { start = equilibrium, for 0.01 s }";
+    let study = study(text);
+    let record = excitation(&study, 0, 0.002);
+    let compiled = Compiled::new(study).unwrap_or_else(|findings| panic!("{findings:?}"));
+    let run = simulate(&compiled, &record, &[], Gradient::None).unwrap_or_else(|failure| panic!("{failure}"));
+    let [x, y, c] = [0, 1, 2].map(|channel: usize| run.channels[channel][0]);
+    assert!((x - 2e-3).abs() < 1e-9, "{x}");
+    assert!((20e3 * y + 500e6 * y.powi(3) - 100.0).abs() < 1e-4, "{y}");
+    assert!((9.0 * c + 40.0 * c.powi(3) - 1.0).abs() < 1e-6, "{c}");
+}

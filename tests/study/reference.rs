@@ -150,7 +150,7 @@ const COMPLETIONS: [Completion; 22] = [
     completion(
         "Tables",
         1,
-        "body block { mass = 2 kg }\njoint slide: prismatic(z) ground -> block\nforce a: damper_curve on slide\nforce b: following_spring on slide { stiffness = 1 kN/m, height = track_height(3 m/s * t) }\n",
+        "body block { mass = 2 kg }\njoint slide: prismatic(z) ground -> block\nforce a: damper_curve on slide\nforce c: damper_map on slide\nforce b: following_spring on slide { stiffness = 1 kN/m, height = track_height(3 m/s * t) }\n",
     ),
     completion(
         "Tables",
@@ -163,7 +163,8 @@ const COMPLETIONS: [Completion; 22] = [
         3,
         "table damper_curve(v: rate) -> load { points = ((-1 m/s, 3.1 kN), (0, 0), (1, -1.8)), interpolation = monotone, extrapolation = linear }\n\
          table track_height(s: length) -> length { file = \"track.csv\", interpolation = monotone, extrapolation = constant }\n\
-         body wheel { mass = 45 kg }\nbody chassis { mass = 320 kg }\njoint wheel_guide: prismatic(z) ground -> wheel\n\
+         table damper_map(x: length, v: velocity) -> force { points = ((0 mm, 0 m/s, 0 N), (1, 0, 1), (0, 1, -9), (1, 1, -7)), interpolation = linear, extrapolation = linear }\n\
+         measure spare_shown [N] = spare\nbody wheel { mass = 45 kg }\nbody chassis { mass = 320 kg }\njoint wheel_guide: prismatic(z) ground -> wheel\n\
          joint chassis_guide: prismatic(z) ground -> chassis\nbody train { mass = 1 t }\njoint run: prismatic(x) ground -> train\n\
          force other: symmetric_damper wheel -> chassis\nmeasure height [mm] = height_below_axle\nidentify { wear in 0.1 .. 2 from 1 }\n",
     ),

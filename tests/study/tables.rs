@@ -98,6 +98,12 @@ fn tables_come_from_files() {
     let study = read().unwrap_or_else(|(text, _)| panic!("{text}")).study;
     close(load_at(&study, -0.5), 750.0);
     close(load_at(&study, 0.25), -500.0);
+    write("map.csv", "x [mm],v [m/s],F [kN]\n0,0,0\n10,0,1\n0,1,2\n10,1,4\n");
+    let surface = "table curve(x: length, v: velocity) -> force { file = \"map.csv\", interpolation = linear, extrapolation = error }\n\
+                   force d: curve on guide\n";
+    write("s.ident", &format!("{SLIDE}{surface}"));
+    close(load_on(&read().unwrap_or_else(|(text, _)| panic!("{text}")).study, 0.005, 0.5), 1750.0);
+    write("s.ident", &format!("{SLIDE}{table}"));
     for (text, code, told) in [
         ("v [mm/s],F [kN]\n0,0\n1,x\n", Code::TABLE_FILE, "`1`, `x` are not two numbers"),
         ("v [mm/s],F [kN],T [degC]\n0,0,1\n", Code::TABLE_FILE, "3 cells instead of two"),
@@ -162,4 +168,91 @@ fn runs_start_at_the_edge_of_a_table() {
     // Beyond the edge the wheel comes to rest on the first point.
     assert!(height.last().is_some_and(|z| z.abs() < 1e-3), "{:?}", height.last());
     assert!(height.iter().any(|z| *z > 6e-3));
+}
+
+/// A map of load over stroke and rate, by this formula at the points of its grid.
+fn map(interpolation: &str, extrapolation: &str, of: impl Fn(f64, f64) -> f64) -> Study {
+    let grid: Vec<(f64, f64)> = (0..6).flat_map(|i| (0..5).map(move |j| (f64::from(i), f64::from(j)))).collect();
+    // In the text in no particular order.
+    let points: Vec<String> = (0..grid.len())
+        .map(|at| grid[(at * 7) % grid.len()])
+        .map(|(i, j)| (0.02 * i - 0.05, 0.5 * j - 1.0))
+        .map(|(x, v)| format!("({x:e} m, {v:e} m/s, {:e} N)", of(x, v)))
+        .collect();
+    study(&format!(
+        "{SLIDE}table map(x: coordinate, v: rate) -> load {{
+           points = ({}), interpolation = {interpolation}, extrapolation = {extrapolation}
+         }}
+         force d: map on guide",
+        points.join(", ")
+    ))
+}
+
+fn load_on(study: &Study, x: f64, v: f64) -> f64 {
+    value(study, study.forces[0].load, &[("guide.position", x), ("guide.velocity", v)])
+}
+
+#[test]
+fn surfaces_pass_their_points_and_go_on_beyond_them() {
+    let rough = |x: f64, v: f64| 3e3 * (40.0 * x).sin() * (2.0 + v * v) - 500.0 * v;
+    for interpolation in ["linear", "cubic"] {
+        for extrapolation in ["constant", "linear", "error"] {
+            let study = map(interpolation, extrapolation, rough);
+            for i in 0..6 {
+                for j in 0..5 {
+                    let (x, v) = (0.02 * f64::from(i) - 0.05, 0.5 * f64::from(j) - 1.0);
+                    let own = load_on(&study, x, v);
+                    assert!((own - rough(x, v)).abs() < 1e-6, "{interpolation} {extrapolation} at {x}, {v}: {own}");
+                }
+            }
+            assert_eq!(load_on(&study, 0.06, 0.0).is_nan(), extrapolation == "error");
+            assert_eq!(load_on(&study, 0.0, -1.1).is_nan(), extrapolation == "error");
+            if extrapolation == "constant" {
+                close(load_on(&study, 0.2, 3.0), load_on(&study, 0.05, 1.0));
+                close(load_on(&study, 0.01, -3.0), load_on(&study, 0.01, -1.0));
+            }
+        }
+    }
+    // Bilinear functions are met everywhere, also beyond the grid; derivatives by both arguments follow.
+    let plain = |x: f64, v: f64| 5.0 - 3e3 * x - 700.0 * v + 8e3 * x * v;
+    for interpolation in ["linear", "cubic"] {
+        let mut study = map(interpolation, "linear", plain);
+        let (load, rate) = (study.forces[0].load, study.forces[0].rate);
+        let slope = study.graph.differentiate(&[load], rate)[0];
+        for (x, v) in [(0.013, 0.2), (-0.049, -0.9), (0.08, 0.3), (0.02, 1.7), (-0.09, -2.0), (0.3, 4.0)] {
+            assert!((load_on(&study, x, v) - plain(x, v)).abs() < 1e-6, "{interpolation} at {x}, {v}");
+            let own = value(&study, slope, &[("guide.position", x), ("guide.velocity", v)]);
+            assert!((own - (8e3 * x - 700.0)).abs() < 1e-6, "{interpolation} at {x}, {v}: {own}");
+        }
+    }
+    // Cubic surfaces are nearer to smooth functions than linear ones.
+    let error = |interpolation: &str| {
+        let study = map(interpolation, "error", rough);
+        let places = [(-0.02, -0.2), (0.003, 0.3), (0.017, -0.4), (-0.013, 0.1)];
+        places.iter().map(|&(x, v)| (load_on(&study, x, v) - rough(x, v)).abs()).fold(0.0, f64::max)
+    };
+    assert!(error("cubic") < 0.25 * error("linear"), "{} {}", error("cubic"), error("linear"));
+}
+
+#[test]
+fn faulty_surfaces_are_told() {
+    let told = |points: &str, more: &str| {
+        let text = format!(
+            "{SLIDE}table map(x: length, v: velocity) -> force {{ points = ({points}), interpolation = {more}, extrapolation = error }}"
+        );
+        let loaded = ident::study::load_text("s", &text);
+        let findings = check(&loaded, None).expect_err("a fault");
+        render(&findings, &loaded.sources, false)
+    };
+    for (points, more, message) in [
+        ("(0 m, 0 m/s, 1 N), (1, 0, 2), (0, 1, 3)", "linear", "there is no point of 1 and 1"),
+        ("(0 m, 0 m/s, 1 N), (1, 0, 2), (0, 1, 3), (1, 1, 4), (1, 0, 9)", "linear", "is there twice"),
+        ("(0 m, 0 m/s, 1 N), (1, 0, 2)", "linear", "at least two values of each"),
+        ("(0 m, 0 m/s), (1, 0)", "linear", "a point is two arguments and a value"),
+        ("(0 m, 0 m, 1 N), (1, 0, 2), (0, 1, 3), (1, 1, 4)", "linear", "from m and m to N"),
+        ("(0 m, 0 m/s, 1 N), (1, 0, 2), (0, 1, 3), (1, 1, 4)", "monotone", "cannot be `monotone`"),
+    ] {
+        let shown = told(points, more);
+        assert!(shown.contains(message), "{points}\n{shown}");
+    }
 }

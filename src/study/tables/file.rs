@@ -5,8 +5,8 @@ use crate::diagnostics::{Code, Diagnostic};
 use crate::quantities::Unit;
 use crate::syntax::Name;
 
-/// The points in SI units with the dimensions of the two columns.
-pub(super) fn read(path: &Name, text: &str) -> Result<Points, Diagnostic> {
+/// The points in SI units with the dimensions of the `count` columns.
+pub(super) fn read(path: &Name, text: &str, count: usize) -> Result<Points, Diagnostic> {
     let fail = |message: String, line: Option<u64>| {
         Diagnostic::error(Code::TABLE_FILE, message).label(path.span, "this file").data(&path.text, line, None)
     };
@@ -22,32 +22,35 @@ pub(super) fn read(path: &Name, text: &str) -> Result<Points, Diagnostic> {
         .delimiter(delimiter)
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
-    let mut units: Option<[Unit; 2]> = None;
+    let mut units: Option<Vec<Unit>> = None;
     let mut points = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|cause| fail(format!("a line cannot be taken apart: {cause}"), None))?;
         let line = record.position().map(csv::Position::line);
-        let [first, second] = [record.get(0), record.get(1)].map(Option::unwrap_or_default);
-        if record.len() != 2 {
-            return Err(fail(format!("a line has {} cells instead of two", record.len()), line));
+        if record.len() != count {
+            let wanted = if count == 2 { "two" } else { "three" };
+            return Err(fail(format!("a line has {} cells instead of {wanted}", record.len()), line));
         }
         match &units {
-            None => units = Some(read_head([first, second]).map_err(|cause| fail(cause, line))?),
+            None => units = Some(read_head(record.iter()).map_err(|cause| fail(cause, line))?),
             Some(units) => {
                 let number = |text: &str| text.replace(',', ".").parse::<f64>().ok().filter(|value| value.is_finite());
-                let (Some(x), Some(y)) = (number(first), number(second)) else {
-                    return Err(fail(format!("`{first}`, `{second}` are not two numbers"), line));
+                let numbers = record.iter().zip(units).map(|(cell, unit)| Some(unit.to_si(number(cell)?)));
+                let Some(numbers) = numbers.collect::<Option<Vec<f64>>>() else {
+                    let cells: Vec<String> = record.iter().map(|cell| format!("`{cell}`")).collect();
+                    let wanted = if count == 2 { "two" } else { "three" };
+                    return Err(fail(format!("{} are not {wanted} numbers", cells.join(", ")), line));
                 };
-                points.push((units[0].to_si(x), units[1].to_si(y)));
+                points.push(numbers);
             }
         }
     }
     let Some(units) = units else { return Err(fail("the file is empty".to_owned(), None)) };
-    Ok((points, units.map(|unit| unit.dimension)))
+    Ok((points, units.into_iter().map(|unit| unit.dimension).collect()))
 }
 
-/// `name [unit]` twice.
-fn read_head(cells: [&str; 2]) -> Result<[Unit; 2], String> {
+/// `name [unit]` per column.
+fn read_head<'c>(cells: impl Iterator<Item = &'c str>) -> Result<Vec<Unit>, String> {
     let mut units = Vec::new();
     for cell in cells {
         if cell.replace(',', ".").parse::<f64>().is_ok() {
@@ -59,5 +62,5 @@ fn read_head(cells: [&str; 2]) -> Result<[Unit; 2], String> {
         };
         units.push(unit.map_err(|cause| cause.to_string())?);
     }
-    <[Unit; 2]>::try_from(units).map_err(|_| "the head needs two columns".to_owned())
+    Ok(units)
 }

@@ -1,11 +1,13 @@
-//! Tables: characteristic curves as functions of one argument, lowered to expressions.
+//! Tables: characteristic curves as functions of one argument, and surfaces over two, lowered to expressions.
 //!
 //! *In*: declarations with points in the text or in a file. *Out*: choices between polynomials over a balanced tree, so
 //! that derivatives follow. *Must not happen here*: reading of files (they are loaded with the study).
 
 mod curve;
 mod file;
+mod polynomials;
 mod series;
+mod surface;
 
 use super::checker::{Allowed, Checker, Scope};
 use super::evaluate::Typed;
@@ -15,15 +17,19 @@ use super::identify::written_unit;
 use super::kinds::{Form, Kinds};
 use super::model::Motion;
 use crate::diagnostics::{Code, Diagnostic, Span};
-use crate::expression::{Binary, Node};
+use crate::expression::Node;
 use crate::quantities::Dimension;
 use crate::syntax::{Expression, Name, TableDeclaration, Value};
 use curve::Shape;
+use polynomials::{Piecewise, constants};
+use surface::Surface;
 
 const SCOPE: Scope = Scope::Study(Allowed::Number);
 
 /// More points are refused: every one is part of the equations.
 const MOST_POINTS: usize = 5_000;
+/// Likewise of surfaces, whose points take several terms each.
+const MOST_POINTS_OF_SURFACES: usize = 1_600;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Beyond {
@@ -32,12 +38,12 @@ enum Beyond {
     Error,
 }
 
-/// Points in SI units, with the dimensions of arguments and values.
-type Points = (Vec<(f64, f64)>, [Dimension; 2]);
+/// Points in SI units, arguments first, with the dimensions of arguments and values.
+type Points = (Vec<Vec<f64>>, Vec<Dimension>);
 
 /// A table that can be evaluated. All numbers SI.
 pub(super) struct Table {
-    argument: Dimension,
+    arguments: Vec<Dimension>,
     value: Dimension,
     shape: TableShape,
 }
@@ -50,6 +56,7 @@ enum TableShape {
         beyond: Beyond,
     },
     Sum(Vec<series::Component>),
+    Surface(Surface),
 }
 
 impl<'a> Checker<'a> {
@@ -72,50 +79,80 @@ impl<'a> Checker<'a> {
             return self.read_series(table);
         }
         self.known_fields(&owner, &table.fields, &["file", "interpolation", "extrapolation", "points"]);
-        let [argument] = table.arguments.as_slice() else {
-            let message = format!("{owner} has {} arguments", table.arguments.len());
+        let count = table.arguments.len();
+        if !(1..=2).contains(&count) {
+            let message = format!("{owner} has {count} arguments");
             let diagnostic = Diagnostic::error(Code::TABLE_FORM, message)
-                .label(table.name.span, "a table is a function of one argument")
-                .help("for a surface, write a law that interpolates between several tables");
-            return self.fail(diagnostic, SCOPE);
-        };
-        let shape = self.word(table, "interpolation", &["linear", "monotone", "cubic"]);
-        let beyond = self.word(table, "extrapolation", &["constant", "linear", "error"]);
-        let ((points, dimensions), span) = self.table_points(table)?;
-        let kind = argument.kind.as_ref();
-        let Some(kind) = kind else {
-            let diagnostic = Diagnostic::error(Code::INVALID_DECLARATION, "the argument of the table has no type")
-                .label(argument.span, "no type")
-                .help(format!("write e.g. `{}: rate`", argument.name.text));
-            return self.fail(diagnostic, SCOPE);
-        };
-        let (first, second) = (self.form(kind)?, self.form(&table.result)?);
-        let fits = [Motion::Translational, Motion::Rotational]
-            .into_iter()
-            .any(|motion| fits(first, second, dimensions, Kinds::of(motion)));
-        if !fits {
-            let message = format!("the points of {owner} do not have the declared types");
-            let diagnostic = Diagnostic::error(Code::DIMENSION_MISMATCH, message)
-                .label(span, format!("from {} to {}", dimensions[0], dimensions[1]))
-                .secondary(kind.span.to(table.result.span), "declared here");
+                .label(table.name.span, "a table is a function of one or two arguments")
+                .help("for more, write a law that combines several tables");
             return self.fail(diagnostic, SCOPE);
         }
-        self.check_points(&points, span)?;
+        let shape = self.word(
+            table,
+            "interpolation",
+            if count == 1 { &["linear", "monotone", "cubic"] } else { &["linear", "cubic"] },
+        );
+        let beyond = self.word(table, "extrapolation", &["constant", "linear", "error"]);
+        let ((points, dimensions), span) = self.table_points(table)?;
+        self.check_types(table, &dimensions, span)?;
+        self.check_points(&points, count, span)?;
         let (shape, beyond) = (shape?, beyond?);
         let shape = match shape {
             "linear" => Shape::Linear,
             "monotone" => Shape::Monotone,
             _ => Shape::Cubic,
         };
-        let pieces = curve::pieces(&points, shape);
         let beyond = match beyond {
             "constant" => Beyond::Constant,
             "linear" => Beyond::Linear,
             _ => Beyond::Error,
         };
-        let arguments = points.iter().map(|point| point.0).collect();
-        let shape = TableShape::Pieces { arguments, pieces, beyond };
-        Some(Table { argument: dimensions[0], value: dimensions[1], shape })
+        let shape = if count == 1 {
+            let points: Vec<(f64, f64)> = points.iter().map(|point| (point[0], point[1])).collect();
+            let pieces = curve::pieces(&points, shape);
+            TableShape::Pieces { arguments: points.iter().map(|point| point.0).collect(), pieces, beyond }
+        } else {
+            match Surface::new(&points, shape, beyond) {
+                Ok(surface) => TableShape::Surface(surface),
+                Err(message) => {
+                    let diagnostic = Diagnostic::error(Code::TABLE_POINTS, message)
+                        .label(span, "these points")
+                        .help("give the value of every pair of the two arguments' values once: a full grid");
+                    return self.fail(diagnostic, SCOPE);
+                }
+            }
+        };
+        let (value, arguments) = dimensions.split_last()?;
+        Some(Table { arguments: arguments.to_vec(), value: *value, shape })
+    }
+
+    /// Arguments and value have types, and the points have them.
+    fn check_types(&mut self, table: &'a TableDeclaration, dimensions: &[Dimension], span: Span) -> Option<()> {
+        let mut forms = Vec::new();
+        for argument in &table.arguments {
+            let Some(kind) = &argument.kind else {
+                let diagnostic = Diagnostic::error(Code::INVALID_DECLARATION, "the argument of the table has no type")
+                    .label(argument.span, "no type")
+                    .help(format!("write e.g. `{}: rate`", argument.name.text));
+                return self.fail(diagnostic, SCOPE);
+            };
+            forms.push(self.form(kind)?);
+        }
+        forms.push(self.form(&table.result)?);
+        let fits = [Motion::Translational, Motion::Rotational]
+            .into_iter()
+            .any(|motion| fits(&forms, dimensions, Kinds::of(motion)));
+        if fits {
+            return Some(());
+        }
+        let declared = table.arguments.first().map_or(table.result.span, |first| first.span.to(table.result.span));
+        let (value, arguments) = dimensions.split_last()?;
+        let arguments: Vec<String> = arguments.iter().map(Dimension::to_string).collect();
+        let message = format!("the points of table `{}` do not have the declared types", table.name.text);
+        let diagnostic = Diagnostic::error(Code::DIMENSION_MISMATCH, message)
+            .label(span, format!("from {} to {value}", arguments.join(" and ")))
+            .secondary(declared, "declared here");
+        self.fail(diagnostic, SCOPE)
     }
 
     /// A field with one of these words; it must be given.
@@ -134,13 +171,15 @@ impl<'a> Checker<'a> {
     fn table_points(&mut self, table: &'a TableDeclaration) -> Option<(Points, Span)> {
         let file = find(&table.fields, "file");
         match (&table.points, file) {
-            (Some((points, span)), None) => Some((self.written_points(points, *span)?, *span)),
+            (Some((points, span)), None) => {
+                Some((self.written_points(points, table.arguments.len() + 1, *span)?, *span))
+            }
             (None, Some(field)) => {
                 let Value::Text(path) = &field.value else {
                     return self.wrong_value(field, "the path of a file in quotes");
                 };
                 let cause = match self.loaded.table_text(field.key.span.file, &path.text) {
-                    Some(Ok(text)) => match file::read(path, text) {
+                    Some(Ok(text)) => match file::read(path, text, table.arguments.len() + 1) {
                         Ok(points) => return Some((points, field.span)),
                         Err(diagnostic) => return self.fail(diagnostic, SCOPE),
                     },
@@ -171,38 +210,44 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn written_points(&mut self, points: &'a [Vec<Expression>], span: Span) -> Option<Points> {
-        if let Some(point) = points.iter().find(|point| point.len() != 2) {
+    fn written_points(&mut self, points: &'a [Vec<Expression>], count: usize, span: Span) -> Option<Points> {
+        if let Some(point) = points.iter().find(|point| point.len() != count) {
             let at = point.first().map_or(span, |first| first.span);
-            let diagnostic = Diagnostic::error(Code::TABLE_POINTS, "a point is an argument and a value")
+            let (message, example) = match count {
+                2 => ("a point is an argument and a value", "(0.5 m/s, 1.2 kN)"),
+                _ => ("a point is two arguments and a value", "(20 mm, 0.5 m/s, 1.2 kN)"),
+            };
+            let diagnostic = Diagnostic::error(Code::TABLE_POINTS, message)
                 .label(at, format!("this one has {} numbers", point.len()))
-                .help("write `(0.5 m/s, 1.2 kN)`");
+                .help(format!("write `{example}`"));
             return self.fail(diagnostic, SCOPE);
         }
         let column = |at: usize| points.iter().filter_map(move |point| point.get(at));
-        let units: [Option<&'a Name>; 2] = [0, 1].map(|at| column(at).find_map(written_unit));
-        let mut dimensions: [Option<(Dimension, Span)>; 2] = [None; 2];
+        let units: Vec<Option<&'a Name>> = (0..count).map(|at| column(at).find_map(written_unit)).collect();
+        let mut dimensions: Vec<Option<(Dimension, Span)>> = vec![None; count];
         let mut read = Vec::new();
         for point in points {
-            let mut numbers = [0.0; 2];
-            for (at, expression) in point.iter().enumerate().take(2) {
+            let mut numbers = Vec::new();
+            for (at, expression) in point.iter().enumerate() {
                 let value = self.number_with(expression, units[at])?;
                 let (wanted, first) = *dimensions[at].get_or_insert((value.dimension, expression.span));
                 let value = self.expect(value, expression.span, wanted, (first, "the first point has"), SCOPE)?;
-                numbers[at] = self.graph.constant_value(value.node)?;
+                numbers.push(self.graph.constant_value(value.node)?);
             }
-            read.push((numbers[0], numbers[1]));
+            read.push(numbers);
         }
-        let dimensions = dimensions.map(|dimension| dimension.map_or(Dimension::ONE, |(dimension, _)| dimension));
-        Some((read, dimensions))
+        let dimensions = dimensions.into_iter().map(|dimension| dimension.map_or(Dimension::ONE, |(own, _)| own));
+        Some((read, dimensions.collect()))
     }
 
-    fn check_points(&mut self, points: &[(f64, f64)], span: Span) -> Option<()> {
+    fn check_points(&mut self, points: &[Vec<f64>], arguments: usize, span: Span) -> Option<()> {
+        let most = if arguments == 1 { MOST_POINTS } else { MOST_POINTS_OF_SURFACES };
+        let falls = |pair: &[Vec<f64>]| arguments == 1 && pair[1][0] <= pair[0][0];
         let message = if points.len() < 2 {
             "a table has at least two points".to_owned()
-        } else if points.len() > MOST_POINTS {
-            format!("the table has {} points; at most {MOST_POINTS} can be treated", points.len())
-        } else if let Some(at) = points.windows(2).position(|pair| pair[1].0 <= pair[0].0) {
+        } else if points.len() > most {
+            format!("the table has {} points; at most {most} can be treated", points.len())
+        } else if let Some(at) = points.windows(2).position(falls) {
             format!("the arguments do not grow from point {} to point {}", at + 1, at + 2)
         } else {
             return Some(());
@@ -226,85 +271,42 @@ impl<'a> Checker<'a> {
         span: Span,
         scope: Scope,
     ) -> Option<Typed> {
-        let ([expression], [value]) = (arguments, values) else {
-            let message = format!("table `{}` takes 1 argument, found {}", name.text, arguments.len());
-            return self.fail(Diagnostic::error(Code::WRONG_ARGUMENTS, message).label(span, ""), scope);
-        };
         let table = self.tables.get(name.text.as_str())?.as_ref()?;
-        let (wanted, dimension) = (table.argument, table.value);
+        let (wanted, dimension) = (table.arguments.clone(), table.value);
+        if arguments.len() != wanted.len() {
+            let plural = if wanted.len() == 1 { "" } else { "s" };
+            let message =
+                format!("table `{}` takes {} argument{plural}, found {}", name.text, wanted.len(), arguments.len());
+            return self.fail(Diagnostic::error(Code::WRONG_ARGUMENTS, message).label(span, ""), scope);
+        }
         let declared = self.declared.tables.iter().find(|table| table.name.text == name.text)?.name.span;
-        let argument = self.expect((*value)?, expression.span, wanted, (declared, "the table takes"), scope)?;
-        let node = self.lowered(&name.text, argument.node)?;
+        let mut nodes = Vec::new();
+        for ((expression, value), wanted) in arguments.iter().zip(values).zip(wanted) {
+            let value = self.expect((*value)?, expression.span, wanted, (declared, "the table takes"), scope)?;
+            nodes.push(value.node);
+        }
+        let node = self.lowered(&name.text, &nodes)?;
         Some(Typed::new(node, dimension))
     }
 
-    fn lowered(&mut self, name: &str, x: Node) -> Option<Node> {
+    fn lowered(&mut self, name: &str, arguments: &[Node]) -> Option<Node> {
         let table = self.tables.get(name)?.as_ref()?;
         let graph = &mut self.graph;
-        let (arguments, pieces, beyond) = match &table.shape {
-            TableShape::Pieces { arguments, pieces, beyond } => (arguments, pieces, *beyond),
-            TableShape::Sum(components) => return Some(series::sum(graph, components, x)),
-        };
-        let (first, last) = (*arguments.first()?, *arguments.last()?);
-        let (low, high) = (graph.constant(first), graph.constant(last));
-        if beyond == Beyond::Constant {
-            let above = graph.binary(Binary::Maximum, x, low);
-            let x = graph.binary(Binary::Minimum, above, high);
-            return Some(tree(graph, arguments, pieces, x));
-        }
-        let inside = tree(graph, arguments, pieces, x);
-        let end = pieces.last().copied().unwrap_or_default();
-        let (width, [a, b, c, d]) = (last - arguments[pieces.len() - 1], end);
-        let at_end = [a + width * (b + width * (c + width * d)), b + width * (2.0 * c + 3.0 * d * width)];
-        let at_begin = pieces.first().map(|piece| [piece[0], piece[1]])?;
-        let (below, above) = if beyond == Beyond::Linear {
-            let below = polynomial(graph, x, first, [at_begin[0], at_begin[1], 0.0, 0.0]);
-            (below, polynomial(graph, x, last, [at_end[0], at_end[1], 0.0, 0.0]))
-        } else {
-            let undefined = graph.constant(f64::NAN);
-            (undefined, undefined)
-        };
-        let is_below = graph.binary(Binary::Less, x, low);
-        let is_above = graph.binary(Binary::Less, high, x);
-        let upper = graph.select(is_above, above, inside);
-        Some(graph.select(is_below, below, upper))
-    }
-}
-
-/// Halves the pieces until one is left.
-fn tree(graph: &mut crate::expression::Graph, arguments: &[f64], pieces: &[[f64; 4]], x: Node) -> Node {
-    if let [piece] = pieces {
-        return polynomial(graph, x, arguments[0], *piece);
-    }
-    let half = pieces.len() / 2;
-    let left = tree(graph, &arguments[..=half], &pieces[..half], x);
-    let right = tree(graph, &arguments[half..], &pieces[half..], x);
-    let middle = graph.constant(arguments[half]);
-    let is_left = graph.binary(Binary::Less, x, middle);
-    graph.select(is_left, left, right)
-}
-
-fn polynomial(graph: &mut crate::expression::Graph, x: Node, from: f64, coefficients: [f64; 4]) -> Node {
-    let from = graph.constant(from);
-    let distance = graph.subtract(x, from);
-    let mut value: Option<Node> = None;
-    for coefficient in coefficients.into_iter().rev() {
-        let own = graph.constant(coefficient);
-        value = match value {
-            None if coefficient == 0.0 => None,
-            None => Some(own),
-            Some(value) => {
-                let product = graph.multiply(value, distance);
-                Some(graph.add(product, own))
+        match (&table.shape, arguments) {
+            (TableShape::Pieces { arguments, pieces, beyond }, &[x]) => {
+                let pieces = constants(graph, pieces);
+                Piecewise { arguments, pieces: &pieces, beyond: *beyond }.at(graph, x)
             }
-        };
+            (TableShape::Sum(components), &[x]) => Some(series::sum(graph, components, x)),
+            (TableShape::Surface(surface), &[x, y]) => surface.at(graph, [x, y]),
+            _ => None,
+        }
     }
-    value.unwrap_or_else(|| graph.constant(0.0))
 }
 
 /// Whether the dimensions of the points are those of the types at a place of these kinds.
-fn fits(argument: Form, value: Form, dimensions: [Dimension; 2], mut kinds: Kinds) -> bool {
-    for (form, dimension) in [(argument, dimensions[0]), (value, dimensions[1])] {
+fn fits(forms: &[Form], dimensions: &[Dimension], mut kinds: Kinds) -> bool {
+    for (form, &dimension) in forms.iter().zip(dimensions) {
         if form.is_open(&kinds) && !form.infer(dimension, &mut kinds) {
             return false;
         }

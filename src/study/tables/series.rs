@@ -59,7 +59,7 @@ impl<'a> Checker<'a> {
                 return self.fail(diagnostic, SCOPE);
             }
         };
-        Some(Table { argument, value, shape: TableShape::Sum(components) })
+        Some(Table { arguments: vec![argument], value, shape: TableShape::Sum(components) })
     }
 
     /// Of argument and value as declared; a table of harmonics has no points that tell them.
