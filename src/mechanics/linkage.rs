@@ -218,7 +218,7 @@ impl Linkage {
     /// Whether the loops leave the coordinates `moved` a motion.
     fn is_free(&mut self, closed: &HashMap<Symbol, f64>, moved: &[usize]) -> bool {
         let m = self.positions.len();
-        let all = self.general_jacobian(closed);
+        let all = self.general_position(closed).1;
         let jacobian: Vec<f64> = moved.iter().flat_map(|&i| &all[i * m..(i + 1) * m]).copied().collect();
         SingularValueDecomposition::new(m, moved.len(), &jacobian).map_or(true, |svd| svd.rank(1e-7) < moved.len())
     }

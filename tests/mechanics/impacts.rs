@@ -129,21 +129,21 @@ fn an_impact_in_a_loop_changes_all_velocities_as_the_constraints_allow() {
 fn a_run_goes_on_behind_the_impact() {
     let text = format!(
         "study slider_crank\n{STOP}
-         body crank {{ mass = 1 kg, inertia = 5e-3 kg*m^2, point pin = (0.1 m, 0 m, 0 m) }}
-         body rod {{ mass = 0.5 kg, inertia = 4e-3 kg*m^2, centre_of_gravity = (0.15 m, 0 m, 0 m), point small = (0.3 m, 0 m, 0 m) }}
+         body crank {{ mass = 1 kg, inertia = 5e-3 kg*m^2, point pin = (0 m, 0 m, 0.1 m) }}
+         body rod {{ mass = 0.5 kg, inertia = 4e-3 kg*m^2, centre_of_gravity = (0.14 m, 0 m, -0.05 m), point small = (0.28 m, 0 m, -0.1 m) }}
          body slider {{ mass = 0.8 kg }}
          joint shaft: revolute(y) ground -> crank\njoint big: revolute(y) crank.pin -> rod
          joint small: revolute(y) rod.small -> slider\njoint guide: prismatic(x) ground -> slider
-         force stop: hard_stop on guide {{ limit = -0.05 m, restitution = 1 }}
+         force stop: hard_stop on guide {{ limit = 0.36 m, restitution = 1 }}
          measure x [m] = guide.position\nmeasure w [rad/s] = shaft.velocity
          measure E [J] = 0.5 * (0.005 kg*m^2 * shaft.velocity^2 + 0.8 kg * guide.velocity^2
            + 0.5 kg * (rod.centre_of_gravity.velocity.x^2 + rod.centre_of_gravity.velocity.z^2) + 0.004 kg*m^2 * rod.angular_velocity.y^2)
-         manoeuvre go {{ for 2 s, step = 10 ms, start = rest {{ shaft.position = 120 deg, guide.position = -163 mm, shaft.velocity = 4 rad/s }} }}
+         manoeuvre go {{ for 2 s, step = 10 ms, start = rest {{ shaft.velocity = 4 rad/s }} }}
          criterion c = max(guide.position) in go\nsolver {{ tolerance = 1e-9 }}\n"
     );
     let own = &run(&text, &[])[0];
     let (energy, rate, way) = (&own["E"], &own["w"], &own["x"]);
-    assert!(way.iter().all(|x| *x < -0.05 + 1e-9) && way.iter().any(|x| *x > -0.06), "{way:?}");
+    assert!(way.iter().all(|x| *x < 0.36 + 1e-9) && way.iter().any(|x| *x > 0.35), "{way:?}");
     assert!(rate.iter().any(|w| *w > 1.0) && rate.iter().any(|w| *w < -1.0), "it must turn back");
     for e in energy {
         assert!((e / energy[0] - 1.0).abs() < 1e-6, "{e} instead of {}", energy[0]);
