@@ -143,22 +143,23 @@ fn sum_of_products(graph: &mut Graph, a: &[Node], b: &[Node]) -> Node {
 fn solve_last(graph: &mut Graph, mut matrix: Vec<Vec<Node>>, last: Node) -> (Vec<Node>, Node) {
     let n = matrix.len();
     for k in 0..n {
-        for i in k + 1..n {
-            if graph.is_zero(matrix[i][k]) {
+        let pivots = matrix[k].clone();
+        for row in &mut matrix[k + 1..] {
+            if graph.is_zero(row[k]) {
                 continue;
             }
-            let factor = graph.divide(matrix[i][k], matrix[k][k]);
-            for j in k..n {
-                let share = graph.multiply(factor, matrix[k][j]);
-                matrix[i][j] = graph.subtract(matrix[i][j], share);
+            let factor = graph.divide(row[k], pivots[k]);
+            for (entry, &pivot) in row.iter_mut().zip(&pivots).skip(k) {
+                let share = graph.multiply(factor, pivot);
+                *entry = graph.subtract(*entry, share);
             }
         }
     }
     let mut solution = vec![last; n];
     for k in (0..n).rev() {
         let mut right = if k + 1 == n { last } else { graph.constant(0.0) };
-        for j in k + 1..n {
-            let share = graph.multiply(matrix[k][j], solution[j]);
+        for (&entry, &known) in matrix[k].iter().zip(&solution).skip(k + 1) {
+            let share = graph.multiply(entry, known);
             right = graph.subtract(right, share);
         }
         solution[k] = graph.divide(right, matrix[k][k]);

@@ -171,11 +171,11 @@ fn friction_by_the_reaction_of_a_driven_spatial_loop() {
         manoeuvre go { for 0.5 s, step = 10 ms, start = rest }
         criterion c = max(guide.position) in go\n";
     let own = &run(text, &[])[0];
-    for k in 0..own["a"].len() {
+    for (k, acceleration) in own["a"].iter().enumerate() {
         let at = |name: &str| own[name][k];
         let normal = (at("y").powi(2) + at("z").powi(2) + 0.01).sqrt();
         let friction = -0.2 * normal * (at("v") / 0.01).tanh();
-        assert!((0.8 * at("a") - at("F") - friction).abs() < 1e-6 * (1.0 + at("F").abs()), "{k}: {friction}");
+        assert!((0.8 * acceleration - at("F") - friction).abs() < 1e-6 * (1.0 + at("F").abs()), "{k}: {friction}");
         // The guide holds what the rod brings, and the weight.
         assert!((at("y") + at("py")).abs() < 1e-6 * (1.0 + at("y").abs()), "{k}");
         assert!((at("z") + at("pz") - 0.8 * 9.81).abs() < 1e-6 * (1.0 + at("z").abs()), "{k}");
