@@ -15,10 +15,13 @@ use crate::diagnostics::Diagnostic;
 use crate::identify::Fitted;
 use crate::signal::effective_count;
 use crate::simulation::{Record, probe};
+use crate::statistics::ErrorChange;
 use rayon::prelude::*;
 
 /// A residual with fewer independent samples than this share is not noise alone.
 const NOISE_SHARE: f64 = 0.9;
+/// Share of the held-out error of the named causes by which a curve must do better than they.
+const LEAST_GAIN: f64 = 0.5;
 /// A search that was asked to end before so many causes may not have come to what it would name.
 const CHAIN: usize = 3;
 /// Curves refitted after the screen, and in how many iterations: beside a misfit that other parameters have bent to, the screen's linear
@@ -140,7 +143,7 @@ fn refitted(
 }
 
 /// Whether the curve explains more than `rival` of the records that were not fitted: a chain of wrong causes follows the fitted ones
-/// ever better and the others ever worse. Where the rival is a patchwork of causes at the curve's own place, as much is enough.
+/// ever better and the others ever worse. Names tell more than a curve that does a little better. Where the rival is a patchwork of causes at the curve's own place, as much is enough.
 fn beats(curve: &Judged, rival: &Model, validation: &[&Record], is_patchwork: bool) -> bool {
     let own = &curve.refitted.fitted;
     let weights = &own.weighting.weights;
@@ -149,7 +152,8 @@ fn beats(curve: &Judged, rival: &Model, validation: &[&Record], is_patchwork: bo
         judge::held_out_residual(&curve.refitted.compiled, own, weights, validation),
     ) {
         (Some(before), Some(after)) => {
-            before.change(&after).is_some_and(|change| change.is_improvement() || is_patchwork && change.lower <= 0.0)
+            let much_better = |change: &ErrorChange| change.is_improvement() && change.estimate <= -LEAST_GAIN;
+            before.change(&after).is_some_and(|change| much_better(&change) || is_patchwork && change.lower <= 0.0)
         }
         (before, after) => before.is_none() && after.is_some(),
     }
