@@ -85,6 +85,44 @@ fn subtract_block<const W: usize>(first: usize, (row, values, v, width, target):
     target.copy_from_slice(&sum);
 }
 
+/// Rows of a triangular matrix in the order in which a solution takes them: position of each and the end of its entries; per entry
+/// the position that it multiplies, and its value.
+pub(super) type TriangularRows<'a> = (&'a [[u32; 2]], &'a [u32], &'a [f64]);
+
+/// `x_i = (x_i - sum_j a_ij x_j) factor_i` row by row of `x`, which has `width` columns; factors of one where none are given.
+pub(super) fn eliminate_rows(triangle: TriangularRows, x: &mut [f64], width: usize, factors: Option<&[f64]>) {
+    eliminate_all_rows(triangle, x, width, factors);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn eliminate_all_rows((rows, columns, values): TriangularRows, x: &mut [f64], width: usize, factors: Option<&[f64]>) {
+    let mut begin = 0;
+    for &[position, end] in rows {
+        let (position, entries) = (position as usize, begin..end as usize);
+        begin = end as usize;
+        let factor = factors.map_or(1.0, |factors| factors[position]);
+        let row = (&columns[entries.clone()], &values[entries]);
+        in_blocks!(width, 32, 16, 8, 4, 2, 1; eliminate_block (row, &mut *x, width, position, factor));
+    }
+}
+
+/// Entries of a row, the whole of `x`, its width, the position of the row, its factor.
+type RowElimination<'a> = ((&'a [u32], &'a [f64]), &'a mut [f64], usize, usize, f64);
+
+#[inline(always)]
+fn eliminate_block<const W: usize>(first: usize, ((columns, values), x, width, position, factor): RowElimination) {
+    let mut sum: [f64; W] = std::array::from_fn(|k| x[position * width + first..][..W][k]);
+    for (&column, value) in columns.iter().zip(values) {
+        let of_column = &x[column as usize * width + first..][..W];
+        for k in 0..W {
+            sum[k] -= value * of_column[k];
+        }
+    }
+    for (target, sum) in x[position * width + first..][..W].iter_mut().zip(sum) {
+        *target = factor * sum;
+    }
+}
+
 /// `out = base + factor sum_s coefficient_s vectors[index_s]` for the listed (index, coefficient).
 ///
 /// # Panics

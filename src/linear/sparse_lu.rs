@@ -3,8 +3,9 @@
 //! further one only recomputes the numbers, until a pivot has become too small and pivots are sought anew.
 
 use super::dense_block::DenseBlock;
-use super::factorisation::{SingularMatrix, subtract_row};
+use super::factorisation::SingularMatrix;
 use super::pattern::SparsityPattern;
+use super::products::{TriangularRows, eliminate_rows};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
@@ -340,11 +341,9 @@ impl SparseLu {
             self.forward.run_one(&mut self.block, None);
             self.backward.run_one(&mut self.block, Some(&self.inverse_pivot));
         } else {
-            let tail = self.tail;
-            self.forward.run(&mut self.block, width, 0..tail, None);
-            self.dense.solve(&mut self.block[tail * width..], width);
-            self.backward.run(&mut self.block, width, tail..n, None);
-            self.backward.run(&mut self.block, width, 0..tail, Some(&self.inverse_pivot));
+            eliminate_rows(self.forward.rows(), &mut self.block, width, None);
+            self.dense.solve(&mut self.block[self.tail * width..], width);
+            eliminate_rows(self.backward.rows(), &mut self.block, width, Some(&self.inverse_pivot));
         }
         for (k, &column) in self.columns.iter().enumerate().filter(|(_, column)| **column < self.wanted) {
             x[column * width..(column + 1) * width].copy_from_slice(&self.block[k * width..(k + 1) * width]);
@@ -357,23 +356,35 @@ impl SparseLu {
         let tail = self.tail;
         let mut is_reached: Vec<bool> = self.pivot_row.iter().map(|&row| row < self.wanted).collect();
         self.forward.clear();
+        let mut by_row: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
         for k in 0..n {
             if is_reached[k] {
-                self.lower.column(k).for_each(|l| is_reached[self.lower.positions[l]] = true);
+                for l in self.lower.column(k) {
+                    is_reached[self.lower.positions[l]] = true;
+                    if k < tail {
+                        by_row[self.lower.positions[l]].push((k as u32, l as u32));
+                    }
+                }
                 let dense = if k >= tail { k + 1..n } else { 0..0 };
                 self.forward.add(k, self.lower.column(k).map(|l| (self.lower.positions[l], l)), dense);
             }
         }
+        self.forward.add_rows(by_row.into_iter().enumerate().filter(|(_, entries)| !entries.is_empty()));
         let mut is_needed: Vec<bool> = self.columns.iter().map(|&column| column < self.wanted).collect();
         for k in 0..n {
             is_needed[k] |= k >= tail || self.upper.column(k).any(|u| is_needed[self.upper.rows[u]]);
         }
         self.backward.clear();
+        let mut by_row: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
         for k in (0..n).rev().filter(|&k| is_needed[k]) {
+            for u in self.upper.column(k).filter(|&u| self.upper.rows[u] < tail && is_needed[self.upper.rows[u]]) {
+                by_row[self.upper.rows[u]].push((k as u32, u as u32));
+            }
             let entries = self.upper.column(k).map(|u| (self.upper.rows[u], u));
             let dense = if k >= tail { tail..k } else { 0..0 };
             self.backward.add(k, entries.filter(|(row, _)| is_needed[*row]), dense);
         }
+        self.backward.add_rows(by_row.into_iter().enumerate().take(tail).rev().filter(|(row, _)| is_needed[*row]));
     }
 
     /// First position from which on both factors together are mostly full.
@@ -413,6 +424,12 @@ struct Pass {
     /// The same for entries of dense ranges, `ABSENT` for zeros.
     dense_from: Vec<u32>,
     dense_values: Vec<f64>,
+    /// The rows that a block of right-hand sides needs outside the dense block, as [`TriangularRows`], and where their values come
+    /// from.
+    rows: Vec<[u32; 2]>,
+    columns: Vec<u32>,
+    row_from: Vec<u32>,
+    row_values: Vec<f64>,
 }
 
 /// A position whose value is subtracted from others: scattered ones, and a range without gaps.
@@ -457,6 +474,17 @@ impl Pass {
         let value = |&from: &u32| if from == ABSENT { 0.0 } else { triangle.values[from as usize] };
         self.dense_values.clear();
         self.dense_values.extend(self.dense_from.iter().map(value));
+        self.row_values.clear();
+        self.row_values.extend(self.row_from.iter().map(|&from| triangle.values[from as usize]));
+    }
+
+    /// Adds rows in the order given: their positions with (column, index in the triangle) of their entries.
+    fn add_rows(&mut self, rows: impl Iterator<Item = (usize, Vec<(u32, u32)>)>) {
+        for (position, entries) in rows {
+            self.columns.extend(entries.iter().map(|(column, _)| column));
+            self.row_from.extend(entries.iter().map(|(_, from)| from));
+            self.rows.push([position as u32, self.columns.len() as u32]);
+        }
     }
 
     fn run_one(&self, x: &mut [f64], inverse_pivot: Option<&[f64]>) {
@@ -485,23 +513,8 @@ impl Pass {
         }
     }
 
-    /// What the sources at `positions` subtract through scattered entries, dense ranges left out.
-    fn run(&self, x: &mut [f64], width: usize, positions: Range<usize>, inverse_pivot: Option<&[f64]>) {
-        let mut start = 0;
-        for source in &self.sources {
-            let (position, end) = (source.position as usize, source.end as usize);
-            let entries = start..end;
-            start = end;
-            if !positions.contains(&position) {
-                continue;
-            }
-            if let Some(inverse) = inverse_pivot {
-                x[position * width..(position + 1) * width].iter_mut().for_each(|value| *value *= inverse[position]);
-            }
-            for (target, factor) in self.targets[entries.clone()].iter().zip(&self.values[entries]) {
-                subtract_row(x, *target as usize, position, width, *factor);
-            }
-        }
+    fn rows(&self) -> TriangularRows<'_> {
+        (&self.rows, &self.columns, &self.row_values)
     }
 }
 

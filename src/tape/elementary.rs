@@ -46,13 +46,21 @@ const COSINE: [f64; 7] = series(4, 2, true);
 /// Of (e^r - 1 - r) / r^2.
 const EXPONENTIAL: [f64; 12] = series(2, 1, false);
 
+/// With neighbours combined first, so that few operations wait for each other (Estrin-1960).
 #[inline(always)]
 fn polynomial<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
-    let mut sum = coefficients[0];
-    for coefficient in &coefficients[1..] {
-        sum = sum * x + coefficient;
+    let mut sums = *coefficients;
+    let (mut count, mut power) = (N, x);
+    while count > 1 {
+        // Pairs from the end of the low powers; an odd one out stays the highest.
+        let odd = count % 2;
+        for k in 0..count / 2 {
+            sums[odd + k] = sums[odd + 2 * k] * power + sums[odd + 2 * k + 1];
+        }
+        count = odd + count / 2;
+        power *= power;
     }
-    sum
+    sums[0]
 }
 
 /// Sine and cosine of the angle less its nearest multiple of pi/2, and that multiple in the low bits.
@@ -81,6 +89,14 @@ pub(super) fn cos(x: f64) -> f64 {
     let (sine, cosine, quarter) = reduced(x);
     let value = if quarter & 1 == 0 { cosine } else { sine };
     f64::from_bits(value.to_bits() ^ ((quarter.wrapping_add(1) & 2) << 62))
+}
+
+pub(super) fn sin_of_any(x: f64) -> f64 {
+    if x.abs() <= LARGEST_ANGLE { sin(x) } else { x.sin() }
+}
+
+pub(super) fn cos_of_any(x: f64) -> f64 {
+    if x.abs() <= LARGEST_ANGLE { cos(x) } else { x.cos() }
 }
 
 /// 2^k for an integer k that a double of normal range can hold, given as k + [`ROUNDING`].

@@ -220,9 +220,9 @@ impl Expansion {
     ) {
         let (n, state_count) = (scale.len(), self.diagonal.len());
         let partials = sweep.partials(registers, inputs, scratch);
-        let slots = &mut memory.slots;
-        slots.clear();
-        slots.resize(self.slot_count, 0.0);
+        memory.slots.clear();
+        memory.slots.resize(self.slot_count, 0.0);
+        let slots = &mut memory.slots[..];
         self.seeds.iter().for_each(|s| slots[s.slot as usize] += partials[s.instruction as usize][s.operand as usize]);
         self.ones.iter().for_each(|&slot| slots[slot as usize] = 1.0);
         let mut begin = 0;

@@ -35,6 +35,8 @@ fn unary(function: Unary, kernel: Kernel) {
         Unary::Abs => kernel.map_one(f64::abs),
         Unary::Sin if kernel.is_within(elementary::LARGEST_ANGLE) => kernel.map_one(elementary::sin),
         Unary::Cos if kernel.is_within(elementary::LARGEST_ANGLE) => kernel.map_one(elementary::cos),
+        Unary::Sin => kernel.map_one_out_of_line(elementary::sin_of_any),
+        Unary::Cos => kernel.map_one_out_of_line(elementary::cos_of_any),
         Unary::Tanh => kernel.map_one(elementary::tanh),
         Unary::Exp => kernel.map_one(elementary::exp),
         other => kernel.map_one_out_of_line(|a| other.evaluate(a)),

@@ -14,6 +14,7 @@ mod emit;
 mod events;
 mod expansion;
 mod kernels;
+mod machine;
 mod model;
 mod program;
 mod schedule;

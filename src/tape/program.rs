@@ -2,7 +2,17 @@
 
 use super::InputSource;
 use super::kernels;
+use super::machine::Machine;
 use crate::expression::{Binary, Unary};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, OnceLock};
+
+/// From this number of instructions per run on the interpreter is as fast as machine code.
+const LONG_RUNS: usize = 24;
+/// Longer programs take too long to translate.
+const MOST_LINES: usize = 5000;
+/// Translation takes about as long as this many executions save.
+const MANY_EXECUTIONS: u32 = 10_000;
 
 /// What an instruction computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -75,6 +85,15 @@ pub(super) struct Program {
     listed: Vec<u32>,
     /// Registers that must exist.
     register_count: usize,
+    translation: Arc<Translation>,
+}
+
+/// Machine code of a program that has been executed often, shared by its copies.
+#[derive(Debug, Default)]
+struct Translation {
+    executions: AtomicU32,
+    /// None where the interpreter is as fast, or no machine code possible.
+    machine: OnceLock<Option<Machine>>,
 }
 
 impl Program {
@@ -91,6 +110,7 @@ impl Program {
 
     /// Appends instructions.
     pub fn extend(&mut self, groups: Vec<Vec<Line>>) {
+        self.translation = Arc::default();
         for lines in groups {
             let mut first = 0;
             while first < lines.len() {
@@ -142,8 +162,34 @@ impl Program {
     /// Executes the program.
     pub fn execute(&self, registers: &mut [f64], inputs: &dyn InputSource) {
         assert!(registers.len() >= self.register_count);
-        // SAFETY: the registers exist; `add_run` has made sure of the operands and filled the lists.
-        unsafe { kernels::execute(&self.runs, &self.listed, registers, inputs) }
+        match self.machine() {
+            // SAFETY: the registers exist; operands stand below targets.
+            Some(machine) => unsafe { machine.execute(registers, inputs) },
+            // SAFETY: the registers exist; `add_run` has made sure of the operands and filled the lists.
+            None => unsafe { kernels::execute(&self.runs, &self.listed, registers, inputs) },
+        }
+    }
+
+    /// The machine code, once enough executions have shown that making it pays. Results do not depend on who executes.
+    #[inline]
+    fn machine(&self) -> Option<&Machine> {
+        let translation = &*self.translation;
+        if let Some(machine) = translation.machine.get() {
+            return machine.as_ref();
+        }
+        // Executions of other threads may get lost in this count, which does no harm and costs less than to count them all.
+        let executions = translation.executions.load(Ordering::Relaxed);
+        translation.executions.store(executions + 1, Ordering::Relaxed);
+        if executions < MANY_EXECUTIONS { None } else { translation.machine.get_or_init(|| self.translate()).as_ref() }
+    }
+
+    fn translate(&self) -> Option<Machine> {
+        let has_short_runs = self.lines.len() < LONG_RUNS * self.runs.len();
+        if has_short_runs && self.lines.len() <= MOST_LINES { self.machine_code() } else { None }
+    }
+
+    fn machine_code(&self) -> Option<Machine> {
+        Machine::new(&self.lines, (&self.runs, &self.listed), self.register_count)
     }
 }
 
@@ -156,5 +202,82 @@ fn form(registers: impl Iterator<Item = u32> + Clone) -> Form {
         Form::Consecutive
     } else {
         Form::Listed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    struct Ramps;
+
+    impl InputSource for Ramps {
+        fn sample(&self, input: u32, order: u8, t: f64) -> f64 {
+            f64::from(input) + (1.0 + f64::from(order)) * t
+        }
+    }
+
+    const CONSTANTS: usize = 6;
+
+    fn instruction() -> impl Strategy<Value = Instruction> {
+        use Binary::{Add, Atan2, Divide, Less, Maximum, Minimum, Multiply, Power, Subtract};
+        use Unary::{Abs, Acos, Asin, Atan, Cos, Cosh, Exp, Floor, Log, Negate, Sign, Sin, Sinh, Sqrt, Tan, Tanh};
+        let unary = prop::sample::select(vec![
+            Negate, Sin, Cos, Tan, Asin, Acos, Atan, Sinh, Cosh, Tanh, Exp, Log, Sqrt, Abs, Sign, Floor,
+        ]);
+        let binary = prop::sample::select(vec![Add, Subtract, Multiply, Divide, Power, Minimum, Maximum, Atan2, Less]);
+        prop_oneof![
+            5 => binary.prop_map(Instruction::Binary),
+            4 => unary.prop_map(Instruction::Unary),
+            1 => Just(Instruction::Copy),
+            1 => Just(Instruction::Select),
+            1 => (0..3_u32, 0..2_u8).prop_map(|(input, order)| Instruction::Sample { input, order }),
+        ]
+    }
+
+    /// Programs in which every line reads any registers below its own, in groups as the scheduler makes them.
+    fn program() -> impl Strategy<Value = Program> {
+        let lines = prop::collection::vec((instruction(), any::<[prop::sample::Index; 3]>(), 1..16_usize), 1..30);
+        lines.prop_map(|lines| {
+            let mut next = CONSTANTS;
+            let group = |(instruction, indices, count): (Instruction, [prop::sample::Index; 3], usize)| {
+                let below = next;
+                let line = |k: usize| {
+                    let mut operands = [0; 3];
+                    for (operand, index) in operands.iter_mut().zip(indices).take(instruction.operand_count()) {
+                        *operand = ((index.index(below) + k) % below) as u32;
+                    }
+                    Line { instruction, target: (below + k) as u32, operands }
+                };
+                next += count;
+                (0..count).map(line).collect()
+            };
+            Program::new(lines.into_iter().map(group).collect())
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn machine_code_gives_the_digits_of_the_interpreter(
+            program in program(),
+            constants in prop::array::uniform6(prop_oneof![9 => -3.0..3.0, 1 => Just(0.0), 1 => -1e7..1e7]),
+        ) {
+            let mut interpreted = constants.to_vec();
+            interpreted.resize(program.register_count.max(CONSTANTS), 0.0);
+            let mut executed = interpreted.clone();
+            let machine = program.machine_code().expect("machine code on this processor");
+            // SAFETY: the registers exist; the program has been built by `Program::new`.
+            unsafe {
+                kernels::execute(&program.runs, &program.listed, &mut interpreted, &Ramps);
+                machine.execute(&mut executed, &Ramps);
+            }
+            for (line, (a, b)) in program.lines().iter().zip(interpreted.iter().zip(&executed).skip(CONSTANTS)) {
+                // The sign of a NaN is nobody's.
+                prop_assert!(a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()), "{line:?}: {a:e} and {b:e}");
+            }
+        }
     }
 }
