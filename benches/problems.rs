@@ -1,8 +1,11 @@
 //! P1 and P2 as studies: one call of the rates, nominal run and gradient at the tolerance that reaches the error asked for.
 //!
 //! `cargo bench --bench problems` prints achieved errors (against a run of the same study at tolerance 1e-10) and medians. The
-//! peers' figures are those of `../shared/bench`, measured on another occasion: ratios across machines are rough.
+//! peers' figures are those of `../shared/bench`, measured on another occasion: ratios across machines are rough. With the
+//! environment variable `IDENT_PEERS` set to a prepared copy of the peers' scripts, they run in turn with the own runs.
 
+#[path = "support/peer.rs"]
+mod peer;
 #[path = "generated/problems.rs"]
 mod problems;
 mod support;
@@ -13,6 +16,7 @@ use ident::integrate::Dynamics;
 use ident::simulation::{Gradient, Trajectory, simulate};
 use ident::statistics::NormalStream;
 use ident::tape::Bound;
+use peer::Peer;
 use support::{compile, record, timed};
 
 /// errY of the problems' definition.
@@ -53,6 +57,35 @@ struct Peers {
     call: f64,
     nominal: f64,
     gradient: f64,
+    /// Relative tolerances at which they reach the same errors; none where a run takes too long to be repeated.
+    nominal_tolerance: &'static str,
+    gradient_tolerance: Option<&'static str>,
+    bdf_tolerance: &'static str,
+}
+
+const P1_PEERS: Peers = Peers {
+    call: 0.22,
+    nominal: 0.035,
+    gradient: 0.155,
+    nominal_tolerance: "3e-8",
+    gradient_tolerance: Some("5e-7"),
+    bdf_tolerance: "1e-8",
+};
+const P2_PEERS: Peers = Peers {
+    call: 1.19,
+    nominal: 0.19,
+    gradient: 14.0,
+    nominal_tolerance: "4e-7",
+    gradient_tolerance: None,
+    bdf_tolerance: "1e-8",
+};
+
+/// Runs in turn with a peer, where one is prepared.
+fn compare<T>(peer: &mut Option<Peer>, request: &str, own: impl FnMut() -> T) {
+    if let Some(peer) = peer {
+        let (own, other) = peer.beside(request, own);
+        println!("    in turn with the peer (`{request}`): {own:.4} s, peer {other:.4} s: {:.2} times", own / other);
+    }
 }
 
 fn problem(name: &str, text: fn(f64) -> String, rate: f64, wanted: (f64, f64), peers: &Peers) {
@@ -61,6 +94,7 @@ fn problem(name: &str, text: fn(f64) -> String, rate: f64, wanted: (f64, f64), p
     let theta: Vec<f64> = compiled.study.parameters.iter().map(|p| p.start).collect();
     let mut bound = Bound::new(&compiled.model, &record.inputs, &theta);
     let n = compiled.model.dimension();
+    let mut peer = Peer::start();
     let (mut y, mut rates) = (vec![0.001; n], vec![0.0; n]);
     let (call, ()) = timed(21, || {
         for k in 0..1000 {
@@ -96,6 +130,12 @@ fn problem(name: &str, text: fn(f64) -> String, rate: f64, wanted: (f64, f64), p
                 peers.nominal,
                 time / peers.nominal
             );
+            let compiled = compile(&with_method(text, tolerance, method));
+            let request = match method {
+                "bdf" => format!("{name} bdf {}", peers.bdf_tolerance),
+                _ => format!("{name} nominal {}", peers.nominal_tolerance),
+            };
+            compare(&mut peer, &request, || simulate(&compiled, &record, &theta, Gradient::None).expect("a run"));
         }
         if method == "bdf" {
             continue;
@@ -120,6 +160,12 @@ fn problem(name: &str, text: fn(f64) -> String, rate: f64, wanted: (f64, f64), p
                 time / peers.gradient,
                 time / nominal
             );
+            if let Some(peers) = peers.gradient_tolerance {
+                let request = format!("{name} gradient {peers}");
+                compare(&mut peer, &request, || {
+                    simulate(&plain, &record, &theta, Gradient::AllParameters).expect("a run")
+                });
+            }
         }
     }
 }
@@ -198,10 +244,10 @@ fn main() {
     let wanted = std::env::args().nth(1).filter(|argument| !argument.starts_with('-'));
     let runs = |name: &str| wanted.as_deref().is_none_or(|wanted| wanted == name);
     if runs("p1") {
-        problem("P1", problems::p1, 1000.0, (1e-6, 1e-4), &Peers { call: 0.22, nominal: 0.035, gradient: 0.155 });
+        problem("P1", problems::p1, 1000.0, (1e-6, 1e-4), &P1_PEERS);
         identification(4.3);
     }
     if runs("p2") {
-        problem("P2", problems::p2, 200.0, (1e-6, 4e-4), &Peers { call: 1.19, nominal: 0.19, gradient: 14.0 });
+        problem("P2", problems::p2, 200.0, (1e-6, 4e-4), &P2_PEERS);
     }
 }

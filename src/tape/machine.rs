@@ -25,6 +25,10 @@ type Entry = unsafe extern "C" fn(*mut f64, *const &dyn InputSource);
 const LONG_RUN: usize = 12;
 const LONG_RUN_OF_CALLS: usize = 3;
 
+/// Frames are small beside the guard of a stack: no probes.
+const SETTINGS: [(&str, &str); 4] =
+    [("opt_level", "speed"), ("is_pic", "false"), ("use_colocated_libcalls", "false"), ("enable_probestack", "false")];
+
 /// A program in executable memory.
 pub(super) struct Machine {
     entry: Entry,
@@ -67,7 +71,7 @@ impl Machine {
     pub fn new(lines: &[Line], (runs, listed): (&[Run], &[u32]), register_count: usize) -> Option<Self> {
         let long = Box::new(LongRuns { runs: runs.to_vec(), listed: listed.to_vec(), register_count });
         let mut flags = settings::builder();
-        for (name, value) in [("opt_level", "speed"), ("is_pic", "false"), ("use_colocated_libcalls", "false")] {
+        for (name, value) in SETTINGS {
             flags.set(name, value).ok()?;
         }
         let isa = cranelift_native::builder().ok()?.finish(settings::Flags::new(flags)).ok()?;

@@ -257,6 +257,34 @@ mod tests {
         })
     }
 
+    /// Registers after the interpreter and after machine code.
+    fn both(program: &Program, constants: &[f64]) -> [Vec<f64>; 2] {
+        let mut interpreted = constants.to_vec();
+        interpreted.resize(program.register_count.max(CONSTANTS), 0.0);
+        let mut executed = interpreted.clone();
+        let machine = program.machine_code().expect("machine code on this processor");
+        // SAFETY: the registers exist; the program has been built by `Program::new`.
+        unsafe {
+            kernels::execute(&program.runs, &program.listed, &mut interpreted, &Ramps);
+            machine.execute(&mut executed, &Ramps);
+        }
+        [interpreted, executed]
+    }
+
+    /// Many values at the same time, more than a processor has registers.
+    #[test]
+    fn long_programs_give_the_same_digits() {
+        let line = |target: usize| {
+            let function = if target % 2 == 0 { Binary::Add } else { Binary::Multiply };
+            let operands = [(target / 2) as u32, (target - 1 - target % 5) as u32, 0];
+            vec![Line { instruction: Instruction::Binary(function), target: target as u32, operands }]
+        };
+        let program = Program::new((CONSTANTS..CONSTANTS + MOST_LINES).map(line).collect());
+        let [interpreted, executed] = both(&program, &[0.3, -0.7, 0.9, 0.2, -0.1, 0.5]);
+        assert_eq!(interpreted, executed);
+        assert!(program.translate().is_some());
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -265,15 +293,7 @@ mod tests {
             program in program(),
             constants in prop::array::uniform6(prop_oneof![9 => -3.0..3.0, 1 => Just(0.0), 1 => -1e7..1e7]),
         ) {
-            let mut interpreted = constants.to_vec();
-            interpreted.resize(program.register_count.max(CONSTANTS), 0.0);
-            let mut executed = interpreted.clone();
-            let machine = program.machine_code().expect("machine code on this processor");
-            // SAFETY: the registers exist; the program has been built by `Program::new`.
-            unsafe {
-                kernels::execute(&program.runs, &program.listed, &mut interpreted, &Ramps);
-                machine.execute(&mut executed, &Ramps);
-            }
+            let [interpreted, executed] = both(&program, &constants);
             for (line, (a, b)) in program.lines().iter().zip(interpreted.iter().zip(&executed).skip(CONSTANTS)) {
                 // The sign of a NaN is nobody's.
                 prop_assert!(a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()), "{line:?}: {a:e} and {b:e}");
