@@ -6,6 +6,9 @@
 //!
 //! A [`Model`] is immutable and shared between threads; all memory of an evaluation is in [`Bound`]. Nodes that depend on
 //! parameters only are computed once per parameter vector, nodes of time and inputs once per time.
+//!
+//! A program is executed run by run of equal instructions; one of short runs that is executed often becomes machine code, which
+//! gives the same digits.
 
 mod bound;
 mod compile;
