@@ -143,7 +143,8 @@ fn refitted(
 }
 
 /// Whether the curve explains more than `rival` of the records that were not fitted: a chain of wrong causes follows the fitted ones
-/// ever better and the others ever worse. Names tell more than a curve that does a little better. Where the rival is a patchwork of causes at the curve's own place, as much is enough.
+/// ever better and the others ever worse. Names tell more than a curve that does a little better. Where the rival is a patchwork of
+/// causes at the curve's own place, as much is enough.
 fn beats(curve: &Judged, rival: &Model, validation: &[&Record], is_patchwork: bool) -> bool {
     let own = &curve.refitted.fitted;
     let weights = &own.weighting.weights;

@@ -230,26 +230,28 @@ impl Newton {
         norm: &ErrorNorm,
         end: &mut StepEnd,
     ) -> Result<(), NewtonFailure> {
-        let mut first = 0.0;
+        let (mut first, mut has_converged) = (0.0, false);
         for iteration in 0..MAXIMUM_ITERATIONS {
             self.find_delta(system, end)?;
             let size = norm.of_correction(&self.delta);
             end.correct(&self.delta);
             if iteration == 0 {
                 first = size;
-                if size <= NEGLIGIBLE {
-                    return Ok(());
-                }
-            } else {
+                has_converged = size <= NEGLIGIBLE;
+            } else if !has_converged {
                 let rate = (size / first).powf(1.0 / iteration as f64);
                 if rate.is_nan() || rate > SLOWEST_RATE {
                     break;
                 }
                 self.rate_factor = rate / (1.0 - rate);
             }
-            if self.rate_factor * size <= TOLERANCE {
+            has_converged |= self.rate_factor * size <= TOLERANCE;
+            if has_converged && norm.multipliers_rest(&self.delta, end.y) {
                 return Ok(());
             }
+        }
+        if has_converged {
+            return Ok(());
         }
         Err(NewtonFailure { cause: FailureCause::NoConvergence, component: self.largest_delta(norm) })
     }

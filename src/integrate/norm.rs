@@ -7,6 +7,11 @@ const GUESS_SHARE: f64 = 0.01;
 /// Keeps the weights of columns that are still zero finite.
 const SMALLEST_COLUMN: f64 = 1e-150;
 
+/// A last correction of the multipliers by this multiple of the relative tolerance may stay: they are one differentiation away from the
+/// velocities, which err by the tolerance itself. Chosen by trial: with less, steps grow to where the velocities between them miss
+/// the constraints by more than ten times the tolerance; with more, multipliers err by percents now and then.
+const MULTIPLIER_SHARE: f64 = 2e4;
+
 /// Weights of the error control: component i of the state may err by `relative |y_i| + absolute_i`, the sensitivity of
 /// component i to parameter j by `relative |S_ij| + absolute_i / parameter_scale_j`.
 ///
@@ -162,6 +167,18 @@ impl ErrorNorm {
         let sum: f64 =
             elements.filter(|(_, is_multiplier)| !**is_multiplier).map(|((e, w), _)| (e * w) * (e * w)).sum();
         finite_root(sum / self.n as f64)
+    }
+
+    /// Whether a correction moves the multipliers by little of the largest of them. What an iteration leaves in them the prediction
+    /// of the next step multiplies; where constraints hold the states all the same, nothing else would stop it from growing.
+    pub fn multipliers_rest(&self, correction: &[f64], y: &[f64]) -> bool {
+        let (mut moved, mut size) = (0.0_f64, 1.0_f64);
+        let elements = correction.iter().zip(y).zip(&self.inverse_scale).zip(&self.is_multiplier);
+        for (((d, y), inverse_scale), _) in elements.filter(|(_, is_multiplier)| **is_multiplier) {
+            moved = moved.max(d.abs() * inverse_scale);
+            size = size.max(y.abs() * inverse_scale);
+        }
+        moved <= MULTIPLIER_SHARE * self.relative * size
     }
 
     /// As [`ErrorNorm::of_correction`], multipliers included.
