@@ -275,7 +275,7 @@ mod tests {
     #[test]
     fn long_programs_give_the_same_digits() {
         let line = |target: usize| {
-            let function = if target % 2 == 0 { Binary::Add } else { Binary::Multiply };
+            let function = if target.is_multiple_of(2) { Binary::Add } else { Binary::Multiply };
             let operands = [(target / 2) as u32, (target - 1 - target % 5) as u32, 0];
             vec![Line { instruction: Instruction::Binary(function), target: target as u32, operands }]
         };
