@@ -21,19 +21,24 @@ use std::collections::HashMap;
 /// The registers, and the inputs as a pointer to a reference.
 type Entry = unsafe extern "C" fn(*mut f64, *const &dyn InputSource);
 
-/// From these lengths on a run is faster in a kernel: of arithmetic, and of functions that are calls as single instructions.
+/// From about these lengths on a run is faster in a kernel: of arithmetic, and of functions that are calls as single instructions.
 const LONG_RUN: usize = 12;
 const LONG_RUN_OF_CALLS: usize = 3;
 
-/// Frames are small beside the guard of a stack: no probes.
-const SETTINGS: [(&str, &str); 4] =
-    [("opt_level", "speed"), ("is_pic", "false"), ("use_colocated_libcalls", "false"), ("enable_probestack", "false")];
+/// Long programs spill more values than the guard page of a stack holds: their frames are probed.
+const SETTINGS: [(&str, &str); 5] = [
+    ("opt_level", "speed"),
+    ("is_pic", "false"),
+    ("use_colocated_libcalls", "false"),
+    ("enable_probestack", "true"),
+    ("probestack_strategy", "inline"),
+];
 
 /// A program in executable memory.
 pub(super) struct Machine {
     entry: Entry,
     /// What the code refers to by address.
-    _long: Box<LongRuns>,
+    _runs: Box<Runs>,
     /// Owns the memory; taken when it is freed.
     module: Option<JITModule>,
 }
@@ -58,8 +63,8 @@ impl std::fmt::Debug for Machine {
     }
 }
 
-/// Runs that kernels execute.
-struct LongRuns {
+/// The program's runs: long ones are executed by kernels, short ones' functions are called.
+struct Runs {
     runs: Vec<Run>,
     listed: Vec<u32>,
     register_count: usize,
@@ -69,7 +74,7 @@ impl Machine {
     /// Code for a program of `lines` in `runs` with their lists over `register_count` registers; none where the system does not
     /// allow it.
     pub fn new(lines: &[Line], (runs, listed): (&[Run], &[u32]), register_count: usize) -> Option<Self> {
-        let long = Box::new(LongRuns { runs: runs.to_vec(), listed: listed.to_vec(), register_count });
+        let owned = Box::new(Runs { runs: runs.to_vec(), listed: listed.to_vec(), register_count });
         let mut flags = settings::builder();
         for (name, value) in SETTINGS {
             flags.set(name, value).ok()?;
@@ -84,14 +89,14 @@ impl Machine {
         context.func.signature.params = vec![AbiParam::new(pointer); 2];
         let mut memory = FunctionBuilderContext::new();
         let builder = FunctionBuilder::new(&mut context.func, &mut memory);
-        Translation::new(builder, module.isa().default_call_conv()).translate(lines, &long, module.target_config());
+        Translation::new(builder, module.isa().default_call_conv()).translate(lines, &owned, module.target_config());
         let function = module.declare_anonymous_function(&context.func.signature).ok()?;
         module.define_function(function, &mut context).ok()?;
         module.finalize_definitions().ok()?;
         let address = module.get_finalized_function(function);
         // SAFETY: the function has been defined with this signature.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry>(address) };
-        Some(Self { entry, _long: long, module: Some(module) })
+        Some(Self { entry, _runs: owned, module: Some(module) })
     }
 
     /// # Safety
@@ -134,15 +139,15 @@ impl<'f> Translation<'f> {
         Self { builder, registers, inputs, known: HashMap::new(), of_one, of_two, of_input, of_kernel }
     }
 
-    fn translate(mut self, lines: &[Line], long: &LongRuns, target: TargetFrontendConfig) {
+    fn translate(mut self, lines: &[Line], program: &Runs, target: TargetFrontendConfig) {
         let mut rest = lines;
-        for (index, run) in long.runs.iter().enumerate() {
+        for (index, run) in program.runs.iter().enumerate() {
             let (of_run, others) = rest.split_at(run.count as usize);
             rest = others;
             if of_run.len() >= shortest_long_run(run.instruction) {
-                self.call_kernel(long, index);
+                self.call_kernel(program, index);
             } else {
-                of_run.iter().for_each(|line| self.single(line));
+                of_run.iter().for_each(|line| self.single(line, &run.instruction));
             }
         }
         self.builder.ins().return_(&[]);
@@ -150,16 +155,17 @@ impl<'f> Translation<'f> {
     }
 
     /// The results stay in the registers until they are read.
-    fn call_kernel(&mut self, long: &LongRuns, index: usize) {
-        let long = self.builder.ins().iconst(I64, std::ptr::from_ref(long) as i64);
+    fn call_kernel(&mut self, program: &Runs, index: usize) {
+        let program = self.address(program);
         let index = self.builder.ins().iconst(I64, index as i64);
         let address = self.builder.ins().iconst(I64, kernel as *const u8 as i64);
-        let arguments = [long, index, self.registers, self.inputs];
+        let arguments = [program, index, self.registers, self.inputs];
         self.builder.ins().call_indirect(self.of_kernel, address, &arguments);
     }
 
-    fn single(&mut self, line: &Line) {
-        let value = self.line(line);
+    /// `instruction`: that of the line, at an address that lives as long as the code.
+    fn single(&mut self, line: &Line, instruction: &Instruction) {
+        let value = self.value(line, instruction);
         self.builder.ins().store(MemFlagsData::trusted(), value, self.registers, offset(line.target));
         self.known.insert(line.target, value);
     }
@@ -173,9 +179,9 @@ impl<'f> Translation<'f> {
         value
     }
 
-    fn line(&mut self, line: &Line) -> Value {
+    fn value(&mut self, line: &Line, instruction: &Instruction) -> Value {
         let operands: Vec<Value> = line.operands().iter().map(|register| self.read(*register)).collect();
-        match (line.instruction, &operands[..]) {
+        match (instruction, &operands[..]) {
             (Instruction::Unary(function), [a]) => self.unary(function, *a),
             (Instruction::Binary(function), [a, b]) => self.binary(function, *a, *b),
             (Instruction::Select, [condition, then, otherwise]) => {
@@ -184,28 +190,30 @@ impl<'f> Translation<'f> {
                 self.builder.ins().select(holds, *then, *otherwise)
             }
             (Instruction::Sample { input, order }, [time]) => {
-                let input = self.builder.ins().iconst(I32, i64::from(input));
-                let order = self.builder.ins().iconst(I32, i64::from(order));
+                let input = self.builder.ins().iconst(I32, i64::from(*input));
+                let order = self.builder.ins().iconst(I32, i64::from(*order));
                 self.call(self.of_input, sample as *const u8, &[self.inputs, input, order, *time])
             }
             (_, operands) => operands[0],
         }
     }
 
-    fn unary(&mut self, function: Unary, a: Value) -> Value {
-        match function {
-            Unary::Negate => self.builder.ins().fneg(a),
-            Unary::Sqrt => self.builder.ins().sqrt(a),
-            Unary::Abs => self.builder.ins().fabs(a),
-            Unary::Sin => self.call_one(sine as *const u8, 0, a),
-            Unary::Cos => self.call_one(cosine as *const u8, 0, a),
-            Unary::Tanh => self.call_one(hyperbolic_tangent as *const u8, 0, a),
-            Unary::Exp => self.call_one(exponential as *const u8, 0, a),
-            other => self.call_one(unary as *const u8, place(&UNARY, &other), a),
-        }
+    fn unary(&mut self, function: &Unary, a: Value) -> Value {
+        let called: extern "C" fn(&Unary, f64) -> f64 = match function {
+            Unary::Negate => return self.builder.ins().fneg(a),
+            Unary::Sqrt => return self.builder.ins().sqrt(a),
+            Unary::Abs => return self.builder.ins().fabs(a),
+            Unary::Sin => sine,
+            Unary::Cos => cosine,
+            Unary::Tanh => hyperbolic_tangent,
+            Unary::Exp => exponential,
+            _ => unary,
+        };
+        let function = self.address(function);
+        self.call(self.of_one, called as *const u8, &[function, a])
     }
 
-    fn binary(&mut self, function: Binary, a: Value, b: Value) -> Value {
+    fn binary(&mut self, function: &Binary, a: Value, b: Value) -> Value {
         match function {
             Binary::Add => self.builder.ins().fadd(a, b),
             Binary::Subtract => self.builder.ins().fsub(a, b),
@@ -216,16 +224,15 @@ impl<'f> Translation<'f> {
                 let (one, zero) = (self.builder.ins().f64const(1.0), self.builder.ins().f64const(0.0));
                 self.builder.ins().select(less, one, zero)
             }
-            other => {
-                let which = self.builder.ins().iconst(I64, place(&BINARY, &other));
-                self.call(self.of_two, binary as *const u8, &[which, a, b])
+            _ => {
+                let function = self.address(function);
+                self.call(self.of_two, binary as *const u8, &[function, a, b])
             }
         }
     }
 
-    fn call_one(&mut self, function: *const u8, which: i64, a: Value) -> Value {
-        let which = self.builder.ins().iconst(I64, which);
-        self.call(self.of_one, function, &[which, a])
+    fn address<T>(&mut self, of: &T) -> Value {
+        self.builder.ins().iconst(I64, std::ptr::from_ref(of) as i64)
     }
 
     fn call(&mut self, signature: SigRef, function: *const u8, arguments: &[Value]) -> Value {
@@ -242,12 +249,12 @@ fn shortest_long_run(instruction: Instruction) -> usize {
     }
 }
 
-extern "C" fn kernel(long: *const LongRuns, index: usize, registers: *mut f64, inputs: *const &dyn InputSource) {
+extern "C" fn kernel(program: *const Runs, index: usize, registers: *mut f64, inputs: *const &dyn InputSource) {
     // SAFETY: the machine owns the runs; its caller has promised the registers and the inputs.
     unsafe {
-        let long = &*long;
-        let registers = std::slice::from_raw_parts_mut(registers, long.register_count);
-        kernels::execute(&long.runs[index..=index], &long.listed, registers, *inputs);
+        let program = &*program;
+        let registers = std::slice::from_raw_parts_mut(registers, program.register_count);
+        kernels::execute(&program.runs[index..=index], &program.listed, registers, *inputs);
     }
 }
 
@@ -255,46 +262,28 @@ fn offset(register: u32) -> i32 {
     8 * register as i32
 }
 
-/// Functions that are called by their place in a list.
-static UNARY: [Unary; 9] = [
-    Unary::Tan,
-    Unary::Asin,
-    Unary::Acos,
-    Unary::Atan,
-    Unary::Sinh,
-    Unary::Cosh,
-    Unary::Log,
-    Unary::Sign,
-    Unary::Floor,
-];
-static BINARY: [Binary; 4] = [Binary::Power, Binary::Minimum, Binary::Maximum, Binary::Atan2];
-
-fn place<T: PartialEq>(list: &[T], function: &T) -> i64 {
-    list.iter().position(|other| other == function).map_or(-1, |place| place as i64)
-}
-
-extern "C" fn sine(_: i64, a: f64) -> f64 {
+extern "C" fn sine(_: &Unary, a: f64) -> f64 {
     elementary::sin_of_any(a)
 }
 
-extern "C" fn cosine(_: i64, a: f64) -> f64 {
+extern "C" fn cosine(_: &Unary, a: f64) -> f64 {
     elementary::cos_of_any(a)
 }
 
-extern "C" fn hyperbolic_tangent(_: i64, a: f64) -> f64 {
+extern "C" fn hyperbolic_tangent(_: &Unary, a: f64) -> f64 {
     elementary::tanh(a)
 }
 
-extern "C" fn exponential(_: i64, a: f64) -> f64 {
+extern "C" fn exponential(_: &Unary, a: f64) -> f64 {
     elementary::exp(a)
 }
 
-extern "C" fn unary(which: i64, a: f64) -> f64 {
-    UNARY[which as usize].evaluate(a)
+extern "C" fn unary(function: &Unary, a: f64) -> f64 {
+    function.evaluate(a)
 }
 
-extern "C" fn binary(which: i64, a: f64, b: f64) -> f64 {
-    BINARY[which as usize].evaluate(a, b)
+extern "C" fn binary(function: &Binary, a: f64, b: f64) -> f64 {
+    function.evaluate(a, b)
 }
 
 extern "C" fn sample(inputs: *const &dyn InputSource, input: u32, order: u32, time: f64) -> f64 {
