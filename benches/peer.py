@@ -27,9 +27,8 @@ def solver(problem, what, tolerance):
 
 
 for line in sys.stdin:
-    key = line.split()
-    problem, what, tolerance = key
     if line not in made:
+        problem, what, tolerance = line.split()
         made[line] = solver(problem, what, float(tolerance))
         made[line]()
     begin = time.perf_counter()

@@ -2,11 +2,11 @@
 
 use ident::simulation::{Compiled, Record, prepare};
 use ident::study::{check, load_text};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-fn median(mut times: Vec<Duration>) -> f64 {
-    times.sort_unstable();
-    times[times.len() / 2].as_secs_f64()
+pub fn median(mut seconds: Vec<f64>) -> f64 {
+    seconds.sort_unstable_by(f64::total_cmp);
+    seconds[seconds.len() / 2]
 }
 
 pub fn timed<T>(repetitions: usize, mut work: impl FnMut() -> T) -> (f64, T) {
@@ -15,7 +15,7 @@ pub fn timed<T>(repetitions: usize, mut work: impl FnMut() -> T) -> (f64, T) {
     for _ in 0..repetitions {
         let begin = Instant::now();
         last = Some(work());
-        times.push(begin.elapsed());
+        times.push(begin.elapsed().as_secs_f64());
     }
     (median(times), last.expect("at least one repetition"))
 }

@@ -1,6 +1,6 @@
 //! A peer that runs beside, so that a ratio is one of this machine at this time.
 
-use crate::support::timed;
+use crate::support::{median, timed};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
@@ -41,13 +41,8 @@ impl Peer {
 
     /// Medians of own runs and of the peer's, taken in turn.
     pub fn beside<T>(&mut self, request: &str, mut own: impl FnMut() -> T) -> (f64, f64) {
-        self.seconds(request);
-        let rounds: Vec<(f64, f64)> = (0..ROUNDS).map(|_| (timed(1, &mut own).0, self.seconds(request))).collect();
-        let middle = |mut times: Vec<f64>| {
-            times.sort_unstable_by(f64::total_cmp);
-            times[times.len() / 2]
-        };
-        (middle(rounds.iter().map(|r| r.0).collect()), middle(rounds.iter().map(|r| r.1).collect()))
+        let (own, peer) = (0..ROUNDS).map(|_| (timed(1, &mut own).0, self.seconds(request))).unzip();
+        (median(own), median(peer))
     }
 }
 
