@@ -4,6 +4,7 @@ use super::prepare::Record;
 use super::run::{Compiled, probe};
 use crate::diagnostics::{Code, Diagnostic};
 use crate::mechanics::TURNING;
+use crate::study::Body;
 
 /// Angular velocity over the lowest circular frequency from which on it is told: centrifugal forces, which go with its square,
 /// then change the stiffness by some percent.
@@ -12,25 +13,18 @@ const FAST: f64 = 0.2;
 /// One warning per elastic body that turns fast in this record, with the parameters `theta` (SI). A record that cannot be
 /// simulated has none: that it fails is told elsewhere.
 pub fn fast_turning(compiled: &Compiled, record: &Record, theta: &[f64]) -> Vec<Diagnostic> {
-    let elastic = |name: &str| {
-        let body = name.strip_suffix(TURNING)?.strip_suffix('.')?;
-        compiled
-            .study
-            .bodies
-            .iter()
-            .find(|b| b.name == body)?
-            .elastic
-            .as_ref()
-            .map(|elastic| (body.to_owned(), elastic.span))
+    let of_body = |body: &Body| {
+        let name = format!("{}.{TURNING}", body.name);
+        let at = compiled.system.probes.iter().position(|probe| probe.name == name)?;
+        Some((at, body.name.clone(), body.elastic.as_ref()?.span))
     };
-    let probes = compiled.system.probes.iter().map(|probe| elastic(&probe.name));
-    let probes: Vec<_> = probes.enumerate().filter_map(|(at, found)| Some((at, found?))).collect();
+    let probes: Vec<_> = compiled.study.bodies.iter().filter_map(of_body).collect();
     if probes.is_empty() {
         return Vec::new();
     }
     let Ok(trajectory) = probe(compiled, record, theta) else { return Vec::new() };
     let mut warnings = Vec::new();
-    for (at, (body, span)) in probes {
+    for (at, body, span) in probes {
         let fastest = trajectory.probes[at].iter().fold(0.0_f64, |most, square| most.max(*square)).sqrt();
         if fastest > FAST {
             let message = format!(

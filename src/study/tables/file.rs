@@ -22,13 +22,13 @@ pub(super) fn read(path: &Name, text: &str, count: usize) -> Result<Points, Diag
         .delimiter(delimiter)
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
+    let wanted = if count == 2 { "two" } else { "three" };
     let mut units: Option<Vec<Unit>> = None;
     let mut points = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|cause| fail(format!("a line cannot be taken apart: {cause}"), None))?;
         let line = record.position().map(csv::Position::line);
         if record.len() != count {
-            let wanted = if count == 2 { "two" } else { "three" };
             return Err(fail(format!("a line has {} cells instead of {wanted}", record.len()), line));
         }
         match &units {
@@ -38,7 +38,6 @@ pub(super) fn read(path: &Name, text: &str, count: usize) -> Result<Points, Diag
                 let numbers = record.iter().zip(units).map(|(cell, unit)| Some(unit.to_si(number(cell)?)));
                 let Some(numbers) = numbers.collect::<Option<Vec<f64>>>() else {
                     let cells: Vec<String> = record.iter().map(|cell| format!("`{cell}`")).collect();
-                    let wanted = if count == 2 { "two" } else { "three" };
                     return Err(fail(format!("{} are not {wanted} numbers", cells.join(", ")), line));
                 };
                 points.push(numbers);
