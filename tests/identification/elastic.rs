@@ -3,7 +3,7 @@
 use crate::shipped::{compiled, fitted, loaded};
 use ident::identify::{Settings, confidence};
 
-/// What the independent generator was given is found, within the intervals widened by what four modes leave out of a beam with a
+/// What the independent generator was given is found, within the intervals widened by what three modes leave out of a beam with a
 /// payload, and nothing but noise is left over.
 #[test]
 fn modes_and_payload_of_an_elastic_arm_are_identified() {
