@@ -35,6 +35,8 @@ pub struct Answer {
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     NothingWrongFound,
+    /// What is left is not white noise, and no candidate explains it.
+    NoCauseFound,
     CauseNamed,
     GroupOfCauses,
     ShapeWithoutName,
@@ -93,12 +95,25 @@ pub struct Step {
     pub judgement: String,
 }
 
+impl Step {
+    /// What this data cannot tell apart, itself included, without further names of the same force.
+    pub fn rivals(&self) -> Vec<&str> {
+        let is_other_name = |name: &str| {
+            let has = |candidate: &Candidate| candidate.same_as.iter().any(|other| other == name);
+            self.accepted.and_then(|index| self.ranking.get(index)).is_some_and(has)
+        };
+        self.indistinguishable.iter().map(String::as_str).filter(|name| !is_other_name(name)).collect()
+    }
+}
+
 #[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct Candidate {
     /// `dry_friction at slide`, `slide.mass set free`.
     pub name: String,
     pub effect: String,
     pub place: String,
+    /// Names under which this very force would appear, too: elements between the same points, or on the same joint.
+    pub same_as: Vec<String>,
     /// In words, from the declaration's documentation.
     pub title: String,
     /// Score statistic (chi-square scale) and its degrees of freedom; absent where there is no score at zero strength.

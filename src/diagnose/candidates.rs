@@ -31,6 +31,8 @@ pub(super) struct Candidate {
     pub unknowns: Vec<Unknown>,
     /// Elements at which the same effect would be the very same force.
     pub aliases: Vec<String>,
+    /// Name of the element that an effect adds; parameters begin with it. Empty for a freed constant.
+    pub element: String,
     /// How the change reads in a variant, without the `identify` block; empty for a freed constant.
     pub change: String,
 }
@@ -60,6 +62,8 @@ pub(super) enum UnknownRole {
     Shape(Vec<f64>),
     /// Frequency, Hz: scanned at the peaks of the residual's spectrum.
     Frequency,
+    /// Period over a quantity of this typical magnitude: all are scanned that the motion can tell apart.
+    Period { magnitude: f64 },
 }
 
 impl Candidate {
@@ -103,7 +107,9 @@ impl Candidate {
 
     /// Names of the shape parameters.
     pub(super) fn shapes(&self) -> impl Iterator<Item = String> + '_ {
-        let is_shape = |unknown: &&Unknown| matches!(unknown.role, UnknownRole::Shape(_) | UnknownRole::Frequency);
+        let is_shape = |unknown: &&Unknown| {
+            matches!(unknown.role, UnknownRole::Shape(_) | UnknownRole::Frequency | UnknownRole::Period { .. })
+        };
         self.unknowns.iter().filter(is_shape).map(|unknown| unknown.target.clone())
     }
 
@@ -113,7 +119,7 @@ impl Candidate {
             .iter()
             .map(|unknown| match &unknown.role {
                 UnknownRole::Shape(values) => values[values.len() / 2],
-                UnknownRole::Frequency => (unknown.lower * unknown.upper).sqrt(),
+                UnknownRole::Frequency | UnknownRole::Period { .. } => (unknown.lower * unknown.upper).sqrt(),
                 _ => unknown.neutral,
             })
             .collect()
@@ -205,6 +211,7 @@ fn effect_candidate(study: &Study, effect: &EffectDeclaration, place: &Place, ty
         aliases: aliases(study, effect, place),
         unknowns,
         change: format!("effect {element}: {} on {} {{ {} }}", effect.name, place.name, fields.join(", ")),
+        element,
     })
 }
 
@@ -284,6 +291,8 @@ fn shape(element: &str, parameter: &EffectParameter, place: &Place, typical: &Ty
     let is_frequency = parameter.monomial.is_empty() && dimension == (Dimension { time: -1, ..Dimension::default() });
     let role = if is_frequency {
         UnknownRole::Frequency
+    } else if let Some(magnitude) = scale.filter(|_| parameter.periodic && lower > 0.0) {
+        UnknownRole::Period { magnitude }
     } else if lower > 0.0 {
         UnknownRole::Shape(log_spaced(lower, upper, SHAPE_VALUES))
     } else {
@@ -320,6 +329,7 @@ fn freed_constant(study: &Study, constant: &crate::study::Constant) -> Option<Ca
             prior: None,
             role: UnknownRole::Amplitude,
         }],
+        element: String::new(),
         change: String::new(),
     })
 }

@@ -27,6 +27,8 @@ pub(super) struct Course {
     pub texts: Vec<String>,
     pub simulations: usize,
     pub below_visibility: bool,
+    /// What the last model leaves has a colour that the study does not say its noise has.
+    pub unexplained: bool,
     /// Whether any accepted candidate belongs to the catalogue's shapes without a name.
     pub unnamed: bool,
     /// The search ended because enough extensions were accepted, not because nothing further was found.
@@ -136,6 +138,12 @@ impl Course {
                 "several causes in a row at {place} may be pieces of one law that the catalogue does not have: see the missing force there"
             ));
         }
+        if self.unexplained && !self.texts.is_empty() {
+            remarks.push(
+                "what is left is still not white noise: some of what was named may be the shadow of a cause that the catalogue does not have"
+                    .to_owned(),
+            );
+        }
         if self.limit_reached {
             remarks.push(format!("stopped after {} extensions as asked; `--extensions N` goes on", self.accepted()));
         }
@@ -162,7 +170,7 @@ impl Course {
             return Verdict::CannotBeJudged;
         }
         if self.texts.is_empty() {
-            return Verdict::NothingWrongFound;
+            return if self.unexplained { Verdict::NoCauseFound } else { Verdict::NothingWrongFound };
         }
         if self.unnamed {
             return Verdict::ShapeWithoutName;
@@ -185,6 +193,12 @@ impl Course {
                 "Nothing wrong found: no candidate improves the held-out record beyond chance (discrepancy {}).",
                 level(base)
             ),
+            Verdict::NoCauseFound => format!(
+                "Nothing in the catalogue explains what is left, and that is not white noise (discrepancy {}). Either the sensors' noise \
+                 has a colour (then say so: `noise = coloured` in the solver), or something acts that the catalogue does not have: see \
+                 where, when and in which band it is left.",
+                level(base)
+            ),
             Verdict::CannotBeJudged => format!(
                 "Cannot be judged with these channels: even the best candidate changes them by less than 0.1 % of their \
                  deviation (discrepancy {}). Measure a quantity that depends on the cause, such as a force, or state the \
@@ -205,7 +219,7 @@ impl Course {
                     .steps
                     .iter()
                     .filter(|step| step.accepted.is_some())
-                    .map(|step| step.indistinguishable.join(" or "))
+                    .map(|step| step.rivals().join(" or "))
                     .collect();
                 format!(
                     "Missing: {} (this data cannot tell the members of a group apart). Discrepancy {} -> {}.",
@@ -238,6 +252,7 @@ fn entry(round: &Round, candidate: &Candidate, screened: Option<&Screened>) -> R
         name: candidate.name.clone(),
         effect: candidate.effect.clone(),
         place: candidate.place.clone(),
+        same_as: candidate.aliases.clone(),
         title: candidate.title.clone(),
         score: screened.and_then(|entry| entry.score),
         visibility: screened.and_then(|entry| entry.visibility),

@@ -3,7 +3,7 @@
 use super::candidates::{Candidate, UnknownRole};
 use super::refit::Refitted;
 use super::round::{Round, deviance, effective_counts};
-use super::{Candidate as Reported, Refit, Strength};
+use super::{Candidate as Reported, FULL_REFITS, Refit, Strength};
 use crate::fit::LeastSquares;
 use crate::identify::{Fitted, Problem, confidence, prefilters};
 use crate::simulation::{Compiled, Record};
@@ -25,7 +25,9 @@ const MINIMUM_VISIBLE_CHANGE: f64 = 1e-3;
 
 /// Bootstrap of held-out changes.
 const REPLICATES: usize = 999;
-const INTERVAL: f64 = 0.95;
+pub(super) const INTERVAL: f64 = 0.95;
+/// Several refits of a round are held against the same record, and several rounds: 5 % over all of a round's.
+const DECIDING_INTERVAL: f64 = 1.0 - LEVEL / FULL_REFITS as f64;
 const SEED: u64 = 1;
 
 /// Held-out residuals of the round's model, to compare candidates with.
@@ -72,7 +74,7 @@ impl<'a> HeldOut<'a> {
     }
 
     /// Relative change of the held-out sum of squares with its interval; `None` where there is nothing to compare.
-    pub(super) fn change(&self, residual: &[f64]) -> Option<ErrorChange> {
+    pub(super) fn change(&self, residual: &[f64], interval: f64) -> Option<ErrorChange> {
         let mut records = Vec::new();
         let mut offset = 0;
         for record in &self.records {
@@ -86,7 +88,7 @@ impl<'a> HeldOut<'a> {
         }
         let difference: Vec<f64> =
             records.iter().flat_map(|(before, after)| before.iter().zip(after).map(|(b, a)| a - b)).collect();
-        error_change(&records, block_length(&difference), REPLICATES, INTERVAL, SEED)
+        error_change(&records, block_length(&difference), REPLICATES, interval, SEED)
     }
 
     /// Discrepancy index of the held-out records, %.
@@ -166,8 +168,12 @@ fn judge_one(
     let held_out_residual = held_out.and_then(|reference| {
         held_out_residual(&refitted.compiled, &refitted.fitted, &round.fitted.weighting.weights, &reference.records)
     });
-    let change = held_out.zip(held_out_residual.as_ref()).and_then(|(reference, residual)| reference.change(residual));
-    let objection = objection(candidate, &refitted, bic - base_bic, p_value, held_out.is_some(), change);
+    let change_within = |interval: f64| {
+        held_out.zip(held_out_residual.as_ref()).and_then(|(reference, residual)| reference.change(residual, interval))
+    };
+    let change = change_within(INTERVAL);
+    let objection =
+        objection(candidate, &refitted, bic - base_bic, p_value, held_out.is_some(), change_within(DECIDING_INTERVAL));
     let report = Refit {
         estimation_discrepancy: refitted.fitted.discrepancy(),
         validation_discrepancy: held_out.zip(held_out_residual.as_ref()).map(|(h, residual)| h.discrepancy(residual)),

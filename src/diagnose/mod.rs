@@ -13,10 +13,12 @@ mod course;
 mod extension;
 mod judge;
 mod missing_force;
+mod periods;
 mod records;
 mod refit;
 mod round;
 mod screen;
+mod sensors;
 mod telling;
 mod typical;
 mod unnamed;
@@ -109,6 +111,10 @@ pub fn diagnose(
         if let Some(curve) = unnamed::unnamed(start, &model, &roles, &mut course, observer)? {
             model = curve;
         }
+    }
+    course.unexplained = unnamed::unexplained(&model);
+    if course.unexplained {
+        course.remarks.extend(sensors::remarks(&model.compiled, &model.fitted, &roles.estimation()));
     }
     let source = missing_force::Source {
         compiled: &model.compiled,

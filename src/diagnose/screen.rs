@@ -6,6 +6,7 @@
 //! zero strength (Breusch-Pagan-1980, Rao-1948) where it exists, else from a grid.
 
 use super::candidates::{Candidate, Unknown, UnknownRole};
+use super::periods::periods;
 use super::round::Round;
 use crate::fit::LeastSquares;
 use crate::identify::Problem;
@@ -100,13 +101,19 @@ impl Screened {
     }
 }
 
-/// All combinations of shape values, as full vectors of unknowns with strengths at neutral.
-fn shape_grid(round: &Round, candidate: &Candidate) -> Vec<Vec<f64>> {
+/// All combinations of shape values, as full vectors of unknowns with strengths at neutral, and the simulations spent on finding them.
+fn shape_grid(round: &Round, candidate: &Candidate) -> (Vec<Vec<f64>>, usize) {
+    let mut simulations = 0;
     let mut grid = vec![candidate.neutral()];
     for (position, unknown) in candidate.unknowns.iter().enumerate() {
         let values: Vec<f64> = match &unknown.role {
             UnknownRole::Shape(values) => values.clone(),
             UnknownRole::Frequency => round.peak_frequencies(unknown.lower, unknown.upper),
+            UnknownRole::Period { magnitude } => {
+                let (found, work) = periods(round, candidate, position, *magnitude);
+                simulations += work;
+                found
+            }
             _ => continue,
         };
         grid = grid
@@ -120,7 +127,7 @@ fn shape_grid(round: &Round, candidate: &Candidate) -> Vec<Vec<f64>> {
             })
             .collect();
     }
-    grid
+    (grid, simulations)
 }
 
 struct Trial<'a> {
@@ -140,7 +147,8 @@ impl Trial<'_> {
     /// Points to try: all finite strengths at all shapes, or multiples of the strength estimated at zero at the shapes whose
     /// score is best. Notes the score on the way.
     fn points(&mut self, best: &mut Screened) -> Vec<Vec<f64>> {
-        let grid = shape_grid(self.round, self.candidate);
+        let (grid, simulations) = shape_grid(self.round, self.candidate);
+        self.problem.simulations += simulations;
         let finite = self.candidate.unknowns.iter().position(|u| matches!(u.role, UnknownRole::FiniteAmplitude(_)));
         if let Some(position) = finite {
             let UnknownRole::FiniteAmplitude(values) = &self.candidate.unknowns[position].role else {
@@ -219,7 +227,7 @@ impl Trial<'_> {
 }
 
 /// Decrease of the sum of squares of `target` when `columns * estimate` is taken away.
-fn explained_by(columns: &[f64], rows: usize, estimate: &[f64], target: &[f64]) -> f64 {
+pub(super) fn explained_by(columns: &[f64], rows: usize, estimate: &[f64], target: &[f64]) -> f64 {
     let mut rest = target.to_vec();
     for (column, value) in columns.chunks_exact(rows).zip(estimate) {
         rest.iter_mut().zip(column).for_each(|(r, c)| *r -= value * c);

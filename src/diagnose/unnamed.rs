@@ -12,7 +12,7 @@ use super::round::Round;
 use super::screen::{self, Screened};
 use super::{Event, FULL_ITERATIONS, Model, Observer, adopt, refit, typical};
 use crate::diagnostics::Diagnostic;
-use crate::identify::Fitted;
+use crate::identify::{Fitted, predicted_shares};
 use crate::signal::effective_count;
 use crate::simulation::{Record, probe};
 use crate::statistics::ErrorChange;
@@ -20,6 +20,8 @@ use rayon::prelude::*;
 
 /// A residual with fewer independent samples than this share is not noise alone.
 const NOISE_SHARE: f64 = 0.9;
+/// Where a channel's residual predicts more than this share of its own power something is wrong, whatever the candidates say.
+const UNEXPLAINED: f64 = 0.3;
 /// Share of the held-out error of the named causes by which a curve must do better than they.
 const LEAST_GAIN: f64 = 0.5;
 /// A search that was asked to end before so many causes may not have come to what it would name.
@@ -56,6 +58,12 @@ fn coloured(fitted: &Fitted) -> bool {
         let residual = &fitted.residual[block.rows.clone()];
         effective_count(residual) < NOISE_SHARE * residual.len() as f64
     })
+}
+
+/// Whether some channel's residual is certainly not white noise, where the study promises that the noise is.
+pub(super) fn unexplained(model: &Model) -> bool {
+    !model.compiled.study.solver.coloured_noise
+        && predicted_shares(&model.fitted).into_iter().any(|share| share > UNEXPLAINED)
 }
 
 /// Curves at all places on `model`; the best one where it is accepted and beats `rival`.
@@ -154,7 +162,9 @@ fn beats(curve: &Judged, rival: &Model, validation: &[&Record], is_patchwork: bo
     ) {
         (Some(before), Some(after)) => {
             let much_better = |change: &ErrorChange| change.is_improvement() && change.estimate <= -LEAST_GAIN;
-            before.change(&after).is_some_and(|change| much_better(&change) || is_patchwork && change.lower <= 0.0)
+            before
+                .change(&after, judge::INTERVAL)
+                .is_some_and(|change| much_better(&change) || is_patchwork && change.lower <= 0.0)
         }
         (before, after) => before.is_none() && after.is_some(),
     }

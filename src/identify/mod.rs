@@ -26,6 +26,7 @@ pub use confidence::{Confidence, confidence};
 pub use constraints::active_constraints;
 pub use errors::{EquationFit, ErrorReport, OtherError, equation_error, error_report};
 pub use fitting::{Fitted, Settings, fit, prefilters};
+pub use noise::predicted_shares;
 pub use problem::{Block, Problem};
 pub use profile::{Profile, profiles};
 pub use report::identification;

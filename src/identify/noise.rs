@@ -68,7 +68,16 @@ pub(super) fn models(fitted: &Fitted) -> Vec<NoiseModel> {
         .collect()
 }
 
-/// Share of the noise's power that its own past predicts, all blocks together; what the prefilter's colour predicts not counted.
+/// Share of the noise's power that its own past predicts, per block of the residual; what the prefilter's colour predicts not counted.
+pub fn predicted_shares(fitted: &Fitted) -> Vec<f64> {
+    let share = |noise: NoiseModel| {
+        let power = noise.model.power();
+        if power > 0.0 { 1.0 - noise.model.variance / power } else { 0.0 }
+    };
+    models(fitted).into_iter().map(share).collect()
+}
+
+/// The same of all blocks together.
 pub(super) fn predicted_share(fitted: &Fitted) -> f64 {
     let (mut left, mut all) = (0.0, 0.0);
     for (block, noise) in fitted.blocks.iter().zip(models(fitted)) {

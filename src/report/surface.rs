@@ -92,7 +92,12 @@ pub fn cuts(cuts: &Cuts) -> String {
         content.push_str(&format!("<g transform=\"translate({x} {y})\">{picture}</g>"));
     }
     let height = TOP + cuts.parameters.len().div_ceil(2) as f64 * CUT.1;
-    framed(WIDTH, height, &format!("Cuts of the cost of {}", escape(&cuts.study)), &content)
+    framed(
+        WIDTH,
+        height,
+        &format!("Cuts of the cost of {}, by band and tolerance of the integrator", escape(&cuts.study)),
+        &content,
+    )
 }
 
 /// One parameter's cut as a picture of its own, for a page.

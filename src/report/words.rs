@@ -12,6 +12,7 @@ pub const STRONG_CORRELATION: f64 = 0.9;
 pub fn verdict(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::NothingWrongFound => "Nothing wrong found",
+        Verdict::NoCauseFound => "No cause found for what is left",
         Verdict::CauseNamed => "Cause named",
         Verdict::GroupOfCauses => "Group of causes that cannot be told apart",
         Verdict::ShapeWithoutName => "A missing force whose cause is not in the catalogue",
@@ -73,7 +74,8 @@ pub fn standing(step: &Step, index: usize) -> String {
         return "accepted".into();
     }
     let objection = candidate.refit.as_ref().and_then(|refit| refit.objection.clone());
-    let in_group = step.indistinguishable.len() > 1 && step.indistinguishable.contains(&candidate.name);
+    let rivals = step.rivals();
+    let in_group = rivals.len() > 1 && rivals.contains(&candidate.name.as_str());
     match (in_group, objection) {
         (true, _) => "cannot be told apart".into(),
         (false, Some(objection)) => objection,
@@ -131,7 +133,7 @@ pub fn combination_note(plan: &Plan) -> &'static str {
     }
 }
 
-/// A factor on a test: whole repetitions above one.
+/// A factor on a test in whole repetitions: one where a part of it would do.
 pub fn repetitions(factor: f64) -> String {
-    if factor > 1.0 { number::fixed(factor.ceil(), 0) } else { number::significant(factor, 2) }
+    number::fixed(factor.ceil().max(1.0), 0)
 }

@@ -21,8 +21,8 @@ const KINDS: [(&str, PlaceKind); 6] = [
     ("signal", PlaceKind::Signal),
 ];
 
-/// What may stand behind an amplitude.
-const FLAGS: [&str; 3] = ["one_sided", "finite", "unnamed"];
+/// What may stand behind an amplitude or a shape.
+const FLAGS: [&str; 4] = ["one_sided", "finite", "unnamed", "periodic"];
 
 /// The word by which declarations name a kind of place.
 pub(super) fn kind_word(kind: PlaceKind) -> &'static str {
@@ -179,6 +179,7 @@ impl<'a> Checker<'a> {
             neutral,
             finite_only: flags[1],
             unnamed: flags[2],
+            periodic: flags[3],
             unit: unit.and_then(|unit| read_unit(unit).ok()),
         })
     }

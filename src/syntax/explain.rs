@@ -439,7 +439,7 @@ fn keywords(rule: Rule) -> Vec<&'static str> {
         Rule::lowpass => vec!["lowpass"],
         Rule::changed | Rule::declaration | Rule::member_declaration => KEYWORDS.to_vec(),
         Rule::model_statement => KEYWORDS.into_iter().chain(["param"]).collect(),
-        Rule::flag => vec!["one_sided", "finite", "unnamed"],
+        Rule::flag => vec!["one_sided", "finite", "unnamed", "periodic"],
         _ => keyword(rule).into_iter().collect(),
     }
 }

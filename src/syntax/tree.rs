@@ -212,7 +212,7 @@ pub struct Declared {
     pub range: Option<(Expression, Expression)>,
     /// `of rate`: the range is relative to the place's typical magnitude of this quantity.
     pub range_of: Option<Name>,
-    /// Words after the declaration: `one_sided`, `finite`, `unnamed`.
+    /// Words after the declaration: `one_sided`, `finite`, `unnamed`, `periodic`.
     pub flags: Vec<Name>,
     /// `neutral 1`
     pub neutral: Option<Expression>,

@@ -57,8 +57,11 @@ pub struct Case {
 const FAST: &str = "filter { lowpass butterworth pass 14 Hz (2 dB) stop 28 Hz (20 dB) zero_phase }";
 const SLOW: &str = "filter { lowpass butterworth pass 3 Hz (2 dB) stop 7 Hz (20 dB) zero_phase }";
 const COLOURED: Colour = Colour::Coloured(0.9, -0.3);
+/// That of the records of `swaying_sensor`, whose study asks for coloured noise.
+const SWAYING: Colour = Colour::Coloured(1.6, -0.8);
 
-/// Three studies, each with white noise, behind a prefilter, with coloured noise, and with weights that know the colour.
+/// Three studies, each with white noise, behind a prefilter, with coloured noise, and with weights that know the colour; one that ships
+/// with coloured noise.
 pub fn cases() -> Vec<Case> {
     let studies = [("spring_slide", FAST), ("two_mass", FAST), ("crane_pendulum", SLOW)];
     let of = |(study, filter): (&'static str, &'static str)| {
@@ -66,7 +69,8 @@ pub fn cases() -> Vec<Case> {
         let coloured = Case { colour: COLOURED, ..white };
         [white, Case { filter: Some(filter), ..white }, coloured, Case { weighted: true, ..coloured }]
     };
-    studies.into_iter().flat_map(of).collect()
+    let swaying = Case { study: "swaying_sensor", filter: None, colour: SWAYING, weighted: true };
+    studies.into_iter().flat_map(of).chain([swaying]).collect()
 }
 
 impl Case {
@@ -123,7 +127,8 @@ pub fn repeat(case: &Case, repetitions: u64, seed: u64) -> Repeated {
                 let noise = case.colour.noise(&mut stream, channel.len());
                 *measured = channel.iter().zip(noise).map(|(value, e)| value + deviation * e).collect();
             }
-            once(&compiled, &noisy, &start, &truth, case.weighted)
+            let weighted = case.weighted || compiled.study.solver.coloured_noise;
+            once(&compiled, &noisy, &start, &truth, weighted)
         })
         .collect();
     let count = repetitions as f64;

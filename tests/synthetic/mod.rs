@@ -162,6 +162,7 @@ pub fn screened(name: &str, title: &str, score: Option<f64>, visibility: f64, pr
         name: name.into(),
         effect: effect.into(),
         place: place.into(),
+        same_as: Vec::new(),
         title: title.into(),
         score: score.map(|score| (score, 1)),
         visibility: Some(visibility),

@@ -11,6 +11,38 @@ use std::path::Path;
 /// Standard deviation of the noise as a share of each channel's rms value.
 pub const NOISE: f64 = 0.01;
 
+/// Noise of a channel: its share of the channel's rms value, and the coefficients by which a sample follows from the two before.
+#[derive(Clone, Copy)]
+pub struct Noise {
+    pub share: f64,
+    pub memory: [f64; 2],
+}
+
+const WHITE: Noise = Noise { share: NOISE, memory: [0.0, 0.0] };
+
+impl Noise {
+    /// Stationary, of variance one.
+    fn samples(self, random: &mut Random, count: usize) -> Vec<f64> {
+        let [a, b] = self.memory;
+        if self.memory == [0.0, 0.0] {
+            return (0..count).map(|_| random.normal()).collect();
+        }
+        let variance = (1.0 - b) / ((1.0 + b) * ((1.0 - b).powi(2) - a * a));
+        let (mut last, mut before) = (0.0, 0.0);
+        let mut next = || {
+            (last, before) = (a * last + b * before + random.normal() / variance.sqrt(), last);
+            last
+        };
+        (0..SETTLING).for_each(|_| {
+            next();
+        });
+        (0..count).map(|_| next()).collect()
+    }
+}
+
+/// Samples after which a process has forgotten its start.
+const SETTLING: usize = 500;
+
 /// Significant digits in the files: rounding stays below a hundredth of the noise.
 const DIGITS_OF_CHANNELS: i32 = 5;
 const DIGITS_OF_INPUT: i32 = 7;
@@ -28,6 +60,11 @@ pub struct Record {
 impl Record {
     /// Excites the mechanism with `amplitude` times the usual level and measures it; `seed` sets phases and noise.
     pub fn measure(mechanism: &dyn Mechanism, effect: &Effect, seed: u64, amplitude: f64) -> Self {
+        Self::with_noise(mechanism, effect, seed, amplitude, &[])
+    }
+
+    /// The same with noise of these kinds in the first channels.
+    pub fn with_noise(mechanism: &dyn Mechanism, effect: &Effect, seed: u64, amplitude: f64, kinds: &[Noise]) -> Self {
         let samples = excite(mechanism, effect, seed, amplitude);
         let mut random = Random::new(seed ^ 0x05EE_D0F4_015E);
         let input = mechanism.input();
@@ -35,11 +72,14 @@ impl Record {
         let commands = samples.input.iter().map(|value| rounded(value / input.factor, DIGITS_OF_INPUT)).collect();
         let mut columns = vec![samples.time, commands];
         let mut noise_free = vec![];
-        for (channel, values) in mechanism.channels().iter().zip(samples.channels) {
+        let kinds = kinds.iter().copied().chain(std::iter::repeat(WHITE));
+        for ((channel, values), kind) in mechanism.channels().iter().zip(samples.channels).zip(kinds) {
             heads.push(format!("{} [{}]", channel.name, channel.unit));
             let values: Vec<f64> = values.into_iter().map(|value| value / channel.factor).collect();
-            let deviation = NOISE * rms(&values);
-            columns.push(values.iter().map(|v| rounded(v + deviation * random.normal(), DIGITS_OF_CHANNELS)).collect());
+            let deviation = kind.share * rms(&values);
+            let noise = kind.samples(&mut random, values.len());
+            let noisy = values.iter().zip(noise).map(|(v, error)| rounded(v + deviation * error, DIGITS_OF_CHANNELS));
+            columns.push(noisy.collect());
             noise_free.push(values);
         }
         Self { heads, columns, noise_free }

@@ -1,7 +1,7 @@
 //! The records of the shipped studies and what they hide.
 
 use super::effect::Effect;
-use super::record::Record;
+use super::record::{Noise, Record};
 
 /// Level of the held-out record's excitation relative to the estimation record's.
 pub const HELD_OUT_LEVEL: f64 = 1.1;
@@ -15,6 +15,9 @@ pub struct Shipped {
     pub file: &'static str,
     pub record: Record,
 }
+
+/// A stand that sways at 18 Hz, sampled at 250 Hz.
+const SWAYING: Noise = Noise { share: 0.03, memory: [1.6, -0.8] };
 
 /// Study, place and effect there.
 type Hidden = (&'static str, &'static str, fn(usize) -> Effect);
@@ -41,6 +44,10 @@ pub fn records() -> Vec<Shipped> {
     for (file, seed, level) in RECORDS {
         let record = Record::measure(slide.as_ref(), &Effect::Nothing, seed, level);
         shipped.push(Shipped { study: "series_springs", file, record });
+    }
+    for (file, seed, level) in RECORDS {
+        let record = Record::with_noise(slide.as_ref(), &Effect::Nothing, seed, level, &[SWAYING]);
+        shipped.push(Shipped { study: "swaying_sensor", file, record });
     }
     shipped.push(Shipped { study: "caster_shimmy", file: "estimation.csv", record: super::shimmy::towing(7) });
     for (file, seed, level) in RECORDS {

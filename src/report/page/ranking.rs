@@ -69,7 +69,8 @@ fn change_scale(step: &Step) -> (f64, f64) {
 fn row(step: &Step, place: usize, scale: (f64, f64)) -> Option<CandidateRow> {
     let candidate: &Candidate = step.ranking.get(place)?;
     let refit = candidate.refit.as_ref();
-    let in_group = step.indistinguishable.len() > 1 && step.indistinguishable.contains(&candidate.name);
+    let rivals = step.rivals();
+    let in_group = rivals.len() > 1 && rivals.contains(&candidate.name.as_str());
     let style = if step.accepted == Some(place) { Style::After } else { Style::Measured };
     let share_bar = |share: f64| bars(&[Bar { value: share, style }], 1.0, 76.0);
     Some(CandidateRow {

@@ -123,7 +123,7 @@ pub fn variant_curves(variants: &[Identification]) -> Vec<Curve<'_>> {
 pub fn answer(answer: &Answer) -> AnswerView {
     let verdict_class = match answer.verdict {
         Verdict::NothingWrongFound | Verdict::CauseNamed => "good",
-        Verdict::GroupOfCauses | Verdict::ShapeWithoutName => "fair",
+        Verdict::GroupOfCauses | Verdict::ShapeWithoutName | Verdict::NoCauseFound => "fair",
         Verdict::CannotBeJudged => "open",
     };
     AnswerView {

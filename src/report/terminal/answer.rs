@@ -34,7 +34,7 @@ pub fn text(answer: &Answer, colour: Colour) -> String {
 fn verdict(sheet: &mut Sheet, answer: &Answer) {
     let code = match answer.verdict {
         Verdict::NothingWrongFound | Verdict::CauseNamed => "1;32",
-        Verdict::GroupOfCauses | Verdict::ShapeWithoutName => "1;33",
+        Verdict::GroupOfCauses | Verdict::ShapeWithoutName | Verdict::NoCauseFound => "1;33",
         Verdict::CannotBeJudged => "1;31",
     };
     sheet.line(&format!("{}: {}", answer.study, answer.title));
@@ -61,8 +61,10 @@ fn causes(sheet: &mut Sheet, answer: &Answer) {
         if let Some(refit) = &candidate.refit {
             strengths(sheet, refit);
         }
-        let others: Vec<&str> =
-            step.indistinguishable.iter().map(String::as_str).filter(|name| *name != candidate.name).collect();
+        if !candidate.same_as.is_empty() {
+            sheet.paragraph(&format!("the very same force as {}", candidate.same_as.join(", ")), 5);
+        }
+        let others: Vec<&str> = step.rivals().into_iter().filter(|name| *name != candidate.name).collect();
         if !others.is_empty() {
             sheet.paragraph(&format!("cannot be told apart from: {}", others.join(", ")), 5);
         }

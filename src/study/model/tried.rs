@@ -107,5 +107,7 @@ pub struct EffectParameter {
     pub finite_only: bool,
     /// Point of a free shape, not the strength of a known cause.
     pub unnamed: bool,
+    /// Shape that is a period: a coarse grid would miss it.
+    pub periodic: bool,
     pub unit: Option<Unit>,
 }
