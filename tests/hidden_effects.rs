@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use support::judge::Outcome;
 use support::{Case, Prepared, Strength};
 use truth::effect::Effect;
-use truth::magnet::{OverMagnet, magnet};
+use truth::magnet::{Pulled, TOOTH, cogging, magnet};
 use truth::record::Record;
 
 const CASES: [Case; 38] = [
@@ -128,14 +128,33 @@ fn nothing_is_invented_where_nothing_is_hidden() {
     assert!(alarms.len() <= 1, "\n{}", alarms.join("\n"));
 }
 
+/// Records of the slider with a force over its position.
+fn pulled(force: fn(f64) -> f64, seed: u64) -> Prepared {
+    let measured = |seed: u64, level: f64| Record::measure(&Pulled::by(force), &Effect::Nothing, seed, level);
+    let (estimation, validation) = (measured(seed, 1.0), measured(seed + 1, 1.1));
+    let case = nothing("spring_slide", seed);
+    Prepared { case, effect: Effect::Nothing, measured_strength: 0.0, estimation, validation }
+}
+
+/// A period along the path that lies between the values of any coarse grid.
+#[test]
+fn cogging_is_found_with_its_period() {
+    let prepared = pulled(cogging, 41);
+    let answer = answer(&prepared);
+    let outcome = Outcome::judge(&prepared, &answer);
+    println!("{outcome}");
+    assert_eq!(outcome.accepted, ["ripple at guide"], "{outcome}");
+    assert!(outcome.gain > 0.95 * outcome.true_gain, "{outcome}");
+    let refit = answer.steps[0].ranking[0].refit.as_ref().expect("the accepted cause was refitted");
+    let pitch = refit.parameters.iter().find(|strength| strength.0.ends_with("pitch")).expect("its period");
+    assert!((pitch.1 / TOOTH - 1.0).abs() < 0.01, "{} m", pitch.1);
+}
+
 /// A force that no law of the catalogue describes: the verdict says so, the extension transfers (eleven points do not make it
 /// exact, and the held-out record goes further out), and the shape shown is the magnet's, with a mean slope that the spring takes.
 #[test]
 fn a_force_without_a_law_is_shown_by_its_shape() {
-    let case = nothing("spring_slide", 39);
-    let measured = |seed: u64, level: f64| Record::measure(&OverMagnet::default(), &Effect::Nothing, seed, level);
-    let (estimation, validation) = (measured(39, 1.0), measured(40, 1.1));
-    let prepared = Prepared { case, effect: Effect::Nothing, measured_strength: 0.0, estimation, validation };
+    let prepared = pulled(magnet, 39);
     let answer = answer(&prepared);
     let outcome = Outcome::judge(&prepared, &answer);
     println!("{outcome}");

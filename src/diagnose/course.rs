@@ -29,6 +29,8 @@ pub(super) struct Course {
     pub below_visibility: bool,
     /// What the last model leaves has a colour that the study does not say its noise has.
     pub unexplained: bool,
+    /// What the sensors themselves show of it.
+    pub sensors: Vec<String>,
     /// Whether any accepted candidate belongs to the catalogue's shapes without a name.
     pub unnamed: bool,
     /// The search ended because enough extensions were accepted, not because nothing further was found.
@@ -127,6 +129,9 @@ impl Course {
         remarks
             .retain(|remark| !self.shapes.iter().any(|shape| remark.starts_with(&format!("{shape} is at its bound"))));
         remarks.extend(self.telling.iter().chain(&self.remarks).cloned());
+        if verdict != Verdict::NoCauseFound {
+            remarks.extend(self.sensors.iter().cloned());
+        }
         if compiled.study.solver.error != ErrorDefinition::Output {
             remarks.push(format!(
                 "the study asks for the {} error; causes are looked for with the output error, to which noise in the process looks like one",
@@ -192,6 +197,11 @@ impl Course {
             Verdict::NothingWrongFound => format!(
                 "Nothing wrong found: no candidate improves the held-out record beyond chance (discrepancy {}).",
                 level(base)
+            ),
+            Verdict::NoCauseFound if !self.sensors.is_empty() => format!(
+                "No cause in the mechanism explains what is left (discrepancy {}), but {}.",
+                level(base),
+                self.sensors.join("; ")
             ),
             Verdict::NoCauseFound => format!(
                 "Nothing in the catalogue explains what is left, and that is not white noise (discrepancy {}). Either the sensors' noise \

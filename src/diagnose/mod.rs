@@ -114,7 +114,7 @@ pub fn diagnose(
     }
     course.unexplained = unnamed::unexplained(&model);
     if course.unexplained {
-        course.remarks.extend(sensors::remarks(&model.compiled, &model.fitted, &roles.estimation()));
+        course.sensors = sensors::remarks(&model.compiled, &model.fitted, &roles.estimation());
     }
     let source = missing_force::Source {
         compiled: &model.compiled,

@@ -1,24 +1,39 @@
-//! The slider of `spring_slide` over a magnet that holds it in the middle and lets it go further out: a force over the position that
-//! no law of the catalogue describes.
+//! The slider of `spring_slide` with a force over its position that the study does not have.
 
 use super::mechanism::{Channel, Instant, Mechanism, Place, Schedule, Vector};
 use super::spring_slide::SpringSlide;
 
-#[derive(Clone, Default)]
-pub struct OverMagnet {
+#[derive(Clone)]
+pub struct Pulled {
     slide: SpringSlide,
+    /// N, at the position in m.
+    force: fn(f64) -> f64,
+}
+
+impl Pulled {
+    pub fn by(force: fn(f64) -> f64) -> Self {
+        Self { slide: SpringSlide::default(), force }
+    }
 }
 
 const STRENGTH: f64 = 25.0;
 const PITCH: f64 = 4e-3;
 const REACH: f64 = 12e-3;
 
-/// The magnet's force on the slider, N, at its position, m.
+/// A magnet that holds the slider in the middle and lets it go further out: no law of the catalogue.
 pub fn magnet(x: f64) -> f64 {
     STRENGTH * (x / PITCH).sin() * (-(x / REACH).powi(2)).exp()
 }
 
-impl Mechanism for OverMagnet {
+/// Of the cogging, m.
+pub const TOOTH: f64 = 3e-3;
+
+/// Cogging of a linear motor.
+pub fn cogging(x: f64) -> f64 {
+    8.0 * (std::f64::consts::TAU * x / TOOTH + 0.4).sin()
+}
+
+impl Mechanism for Pulled {
     fn places(&self) -> &[Place] {
         self.slide.places()
     }
@@ -41,7 +56,7 @@ impl Mechanism for OverMagnet {
 
     fn law(&self, place: usize, x: f64, v: f64, u: f64) -> f64 {
         let guide = self.slide.place("guide");
-        self.slide.law(place, x, v, u) + if Some(place) == guide { magnet(x) } else { 0.0 }
+        self.slide.law(place, x, v, u) + if Some(place) == guide { (self.force)(x) } else { 0.0 }
     }
 
     fn accelerations(&self, q: &Vector, v: &Vector, force: &Vector) -> Vector {
