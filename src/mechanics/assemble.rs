@@ -6,6 +6,7 @@ use super::events::Changes;
 use super::kinematics::FrameMotion;
 use super::multipliers::{Loops, algebraic_part};
 use super::scale::typical_magnitude;
+use super::selection::Choice;
 use super::starts::starts;
 use super::system::{Event, Output, StartEquation, System, TURNING, Variable, VariableKind};
 use super::topology::{Axis, Coordinate, Tree};
@@ -44,6 +45,8 @@ pub(super) fn assemble(
     rates.extend(free.map(|&link| accelerated[link].acceleration));
     let derivatives: Vec<Node> = study.states.iter().map(|state| state.derivative).collect();
     rates.extend(graph.substitute(&derivatives, meaning));
+    states.extend(loops.choices.iter().map(|choice| choice_variable(&graph, choice)));
+    rates.extend(loops.choices.iter().map(|_| graph.constant(0.0)));
 
     let values: Vec<Node> = study.outputs().map(|(_, value, _)| value).collect();
     let values = graph.substitute(&values, meaning);
@@ -51,8 +54,9 @@ pub(super) fn assemble(
     let outputs: Vec<Output> = study.outputs().zip(values).map(name_and_value).collect();
     let mut probes = probes(&mut graph, study, meaning);
     probes.extend(turning(&mut graph, study, tree, frames));
-    let events = events(&mut graph, study, &states, meaning, changes);
-    let starts = all_starts(&mut graph, study, &states, meaning, &loops.closed)?;
+    let mut events = events(&mut graph, study, &states, meaning, changes);
+    events.extend(loops.choices.iter().filter_map(|choice| change_over(&states, choice)));
+    let starts = all_starts(&mut graph, study, &states, meaning, &loops)?;
     let (algebraic, constraints, constraint_names) = algebraic_part(&mut graph, study, &loops, &reactions);
 
     let system = System {
@@ -63,7 +67,7 @@ pub(super) fn assemble(
         algebraic,
         constraints,
         constraint_names,
-        loop_constraints: loops.rows.len(),
+        loop_constraints: loops.multipliers.len(),
         warnings: loops.warnings,
         parameters: study.parameters.iter().map(|p| p.symbol).collect(),
         parameter_names: study.parameters.iter().map(|p| p.name.clone()).collect(),
@@ -193,6 +197,20 @@ fn events(
     study.events.iter().zip(changes).map(event).collect()
 }
 
+/// Which constraints are in force: a number that changes at events only.
+fn choice_variable(graph: &Graph, choice: &Choice) -> Variable {
+    let name = graph.symbol_name(choice.symbol).to_owned();
+    let scale = typical_magnitude(Dimension::ONE, VariableKind::Law);
+    Variable { symbol: choice.symbol, name, kind: VariableKind::Law, dimension: Dimension::ONE, scale, reference: 0.0 }
+}
+
+/// Other constraints of a loop come into force.
+fn change_over(states: &[Variable], choice: &Choice) -> Option<Event> {
+    let at = states.iter().position(|state| state.symbol == choice.symbol)?;
+    let trigger = EventTrigger::Rises(choice.condition);
+    Some(Event { name: states[at].name.clone(), trigger, changes: vec![(at, choice.change)] })
+}
+
 fn probes(graph: &mut Graph, study: &Study, meaning: &HashMap<Symbol, Node>) -> Vec<Output> {
     let mut probes = Vec::new();
     for place in &study.places {
@@ -222,7 +240,7 @@ fn all_starts(
     study: &Study,
     states: &[Variable],
     meaning: &HashMap<Symbol, Node>,
-    closed: &[HashMap<Symbol, f64>],
+    loops: &Loops,
 ) -> Result<Vec<Vec<StartEquation>>, Vec<Diagnostic>> {
     let initial: Vec<Node> = study.states.iter().map(|state| state.initial).collect();
     let initial = graph.substitute(&initial, meaning);
@@ -231,7 +249,7 @@ fn all_starts(
     let mut errors = Vec::new();
     for (number, (name, start, span)) in study.starts().enumerate() {
         let mut states = states.to_vec();
-        if let Some(closed) = closed.get(number) {
+        if let Some(closed) = loops.closed.get(number) {
             states
                 .iter_mut()
                 .for_each(|state| state.reference = closed.get(&state.symbol).copied().unwrap_or(state.reference));
@@ -242,6 +260,10 @@ fn all_starts(
         let held = study.states.iter().filter(|state| graph.is_zero(state.derivative));
         let mut overrides: Vec<(Symbol, Node)> =
             held.filter_map(|state| Some((state.symbol, *initial.get(&state.symbol)?))).collect();
+        for choice in &loops.choices {
+            let set = choice.at_starts.get(number).copied().unwrap_or(0);
+            overrides.push((choice.symbol, graph.constant(set as f64)));
+        }
         overrides.extend(start.overrides.iter().map(|&(symbol, _)| symbol).zip(values));
         match starts(graph, &states, (&name, start.base, span), &initial, &overrides) {
             Ok(equations) => result.push(equations),

@@ -2,6 +2,7 @@
 
 use super::linkage::{Linkage, OtherPosition};
 use super::loops::{Direction, Row};
+use super::selection::{Group, Jacobian, groups};
 use super::topology::Tree;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::{Graph, Node, Symbol};
@@ -18,6 +19,8 @@ pub(super) struct Assembly {
     pub positions: Vec<HashMap<Symbol, f64>>,
     /// A closed position that is not special.
     pub general: HashMap<Symbol, f64>,
+    /// Where other rows than the kept ones count in other positions.
+    pub groups: Vec<Group>,
     pub warnings: Vec<Diagnostic>,
 }
 
@@ -82,7 +85,36 @@ pub(super) fn assemble_loops(
         return Err(vec![contradicted(study, &rows[row])]);
     }
     warnings.extend(redundancies(study, rows, &kept));
-    Ok(Assembly { warnings, kept, positions, general })
+    let groups = changing(&mut linkage, is_driven, &kept, &jacobian, (&general, &positions));
+    Ok(Assembly { warnings, kept, positions, general, groups })
+}
+
+/// Mechanisms of more freedoms keep the constraints that are independent near their start.
+const MOST_FREEDOMS: usize = 30;
+
+/// Groups of rows of which different ones are independent in different positions.
+fn changing(
+    linkage: &mut Linkage,
+    is_driven: bool,
+    kept: &[usize],
+    jacobian: &[f64],
+    (general, starts): (&HashMap<Symbol, f64>, &[HashMap<Symbol, f64>]),
+) -> Vec<Group> {
+    let n = linkage.freedom();
+    let m = jacobian.len() / n.max(1);
+    let largest = jacobian.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
+    let says_nothing = |row: usize| (0..n).all(|j| jacobian[j * m + row].abs() < 1e-9 * largest);
+    let is_spatial = (0..m).any(|row| !kept.contains(&row) && !says_nothing(row));
+    if !is_spatial || n == 0 || n > MOST_FREEDOMS {
+        return vec![];
+    }
+    let along = linkage.jacobians_along(general, is_driven);
+    let starts: Vec<Vec<f64>> = starts.iter().map(|closed| linkage.jacobian_at(closed)).collect();
+    groups(kept, &all(m, &along), &all(m, &starts))
+}
+
+fn all(rows: usize, jacobians: &[Vec<f64>]) -> Vec<Jacobian<'_>> {
+    jacobians.iter().map(|values| Jacobian { rows, values }).collect()
 }
 
 /// Prescribed motions that the loops do not allow.

@@ -130,7 +130,7 @@ fn velocities_after(
     After { velocities: changed, mobility: [alone, left] }
 }
 
-fn sum_of_products(graph: &mut Graph, a: &[Node], b: &[Node]) -> Node {
+pub(super) fn sum_of_products(graph: &mut Graph, a: &[Node], b: &[Node]) -> Node {
     let mut sum = graph.constant(0.0);
     for (&a, &b) in a.iter().zip(b) {
         let product = graph.multiply(a, b);

@@ -29,6 +29,13 @@ const ELSEWHERE: f64 = 0.1;
 /// Tries to find another position, and the size of mechanism up to which it is tried.
 const TRIES: usize = 8;
 const MOST_FREEDOMS: usize = 40;
+/// Ways tried from a position, steps along each, and their length (rad; m).
+const WAYS: usize = 4;
+const STEPS: usize = 150;
+const STEP: f64 = 0.1;
+/// Steps along prescribed motions, and the longest, s.
+const DRIVEN_STEPS: usize = 300;
+const LONGEST_STEP: f64 = 0.1;
 /// Times at which prescribed motions are compared with the loops, s.
 const TIMES: [f64; 3] = [0.0, 0.05, 0.3];
 /// Velocities that the loops take up to this share are allowed by them.
@@ -52,6 +59,8 @@ pub(super) struct Linkage {
     freedoms: Vec<Freedom>,
     /// Parameters at their start, coordinates where the mechanism stands.
     values: HashMap<Symbol, f64>,
+    /// Inputs, whatever they are, grow with time; else they are zero.
+    is_driven: bool,
 }
 
 /// A rate that is free, and what it changes.
@@ -119,7 +128,7 @@ impl Linkage {
             }
         }
         let (positions, velocities, upright) = (positions.to_vec(), velocities.to_vec(), upright.to_vec());
-        Self { graph: small, time: study.time, positions, velocities, upright, freedoms, values }
+        Self { graph: small, time: study.time, positions, velocities, upright, freedoms, values, is_driven: false }
     }
 
     pub fn freedom(&self) -> usize {
@@ -178,6 +187,46 @@ impl Linkage {
         }
         let jacobian = self.jacobian();
         (std::mem::replace(&mut self.values, drawn), jacobian)
+    }
+
+    /// The Jacobian of the constraints, m x n, column-major.
+    pub fn jacobian_at(&mut self, closed: &HashMap<Symbol, f64>) -> Vec<f64> {
+        let drawn = std::mem::replace(&mut self.values, closed.clone());
+        let jacobian = self.jacobian();
+        self.values = drawn;
+        jacobian
+    }
+
+    /// Jacobians in positions along the ways that the loops leave free, from a closed position.
+    pub fn jacobians_along(&mut self, closed: &HashMap<Symbol, f64>, is_driven: bool) -> Vec<Vec<f64>> {
+        let drawn = std::mem::replace(&mut self.values, closed.clone());
+        let all: Vec<usize> = (0..self.freedoms.len()).collect();
+        let mut found = Vec::new();
+        for way in 0..WAYS {
+            self.values = closed.clone();
+            // The second way leads back from where the first leads to, and so on.
+            let sign = if way % 2 == 0 { 1.0 } else { -1.0 };
+            let mut heading: Vec<f64> =
+                all.iter().map(|&i| sign * (1.0 + 2.4 * (i + (way / 2) * all.len()) as f64).sin()).collect();
+            for _ in 0..STEPS {
+                let jacobian = self.jacobian();
+                let is_moving = allowed(&jacobian, &mut heading);
+                found.push(jacobian);
+                if !is_moving {
+                    break;
+                }
+                let step: Vec<f64> = heading.iter().map(|share| STEP * share).collect();
+                self.advance(&all, &step);
+                if self.close(&all).is_err() {
+                    break;
+                }
+            }
+        }
+        if is_driven {
+            self.driven(closed, &mut found);
+        }
+        self.values = drawn;
+        found
     }
 
     /// Another way to close the loops with what is given, where the position chosen is far from the start.
@@ -275,14 +324,44 @@ impl Linkage {
     }
 
     fn evaluate(&self, nodes: &[Node]) -> Vec<f64> {
-        self.graph.evaluate(nodes, |s| self.values.get(&s).copied().unwrap_or(0.0), |_, _, _| 0.0)
+        self.graph.evaluate(nodes, |s| self.values.get(&s).copied().unwrap_or(0.0), self.input())
+    }
+
+    fn input(&self) -> impl Fn(u32, u8, f64) -> f64 {
+        let slope = if self.is_driven { 1.0 } else { 0.0 };
+        move |_, order, t| match order {
+            0 => slope * t,
+            1 => slope,
+            _ => 0.0,
+        }
+    }
+
+    /// Jacobians in positions through which prescribed motions lead from a closed position.
+    fn driven(&mut self, closed: &HashMap<Symbol, f64>, found: &mut Vec<Vec<f64>>) {
+        self.values = closed.clone();
+        self.is_driven = true;
+        let all: Vec<usize> = (0..self.freedoms.len()).collect();
+        let rates: Vec<Symbol> = self.freedoms.iter().map(|freedom| freedom.rate).collect();
+        let mut time = 0.0;
+        for _ in 0..DRIVEN_STEPS {
+            let value = |s: Symbol| if rates.contains(&s) { 0.0 } else { self.values.get(&s).copied().unwrap_or(0.0) };
+            let driven = self.graph.evaluate(&self.velocities, value, self.input());
+            let speed = driven.iter().fold(0.0_f64, |most, rate| most.max(rate.abs()));
+            time += (STEP / speed).min(LONGEST_STEP);
+            self.values.insert(self.time, time);
+            if self.close(&all).is_err() {
+                break;
+            }
+            found.push(self.jacobian());
+        }
+        self.is_driven = false;
     }
 
     /// dg/dt per rate: m x n, column-major.
     fn jacobian(&self) -> Vec<f64> {
         let at = |moving: Option<Symbol>| {
             let value = |s: Symbol| if Some(s) == moving { 1.0 } else { self.values.get(&s).copied().unwrap_or(0.0) };
-            self.graph.evaluate(&self.velocities, value, |_, _, _| 0.0)
+            self.graph.evaluate(&self.velocities, value, self.input())
         };
         let resting = at(None);
         let column = |rate: Symbol| at(Some(rate)).into_iter().zip(&resting).map(|(v, r)| v - r).collect::<Vec<_>>();
@@ -397,4 +476,20 @@ impl Linkage {
         }
         step.iter().all(|s| s.is_finite()).then_some(step)
     }
+}
+
+/// Reduces a heading to the part that the constraints allow, its largest component one; whether there is any.
+fn allowed(jacobian: &[f64], heading: &mut [f64]) -> bool {
+    let (n, m) = (heading.len(), jacobian.len() / heading.len().max(1));
+    let Ok(svd) = SingularValueDecomposition::new(m, n, jacobian) else { return false };
+    for j in 0..svd.rank(1e-7) {
+        let along: f64 = svd.right(j).iter().zip(heading.iter()).map(|(a, b)| a * b).sum();
+        heading.iter_mut().zip(svd.right(j)).for_each(|(h, v)| *h -= along * v);
+    }
+    let largest = heading.iter().fold(0.0_f64, |m, h| m.max(h.abs()));
+    if largest < 1e-6 {
+        return false;
+    }
+    heading.iter_mut().for_each(|h| *h /= largest);
+    true
 }

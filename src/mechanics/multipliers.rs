@@ -1,10 +1,11 @@
 //! Multipliers of closed loops, on velocity and on position level (Gear-Gupta-Leimkuhler-1985).
 
 use super::articulated::Wrench;
-use super::assembly::{Constraints, assemble_loops};
+use super::assembly::{Assembly, Constraints, assemble_loops};
 use super::kinematics::{self, FrameMotion};
 use super::loops::{self, Direction, Row};
 use super::scale::typical_magnitude;
+use super::selection::{Choice, is_in_force};
 use super::system::{Variable, VariableKind};
 use super::topology::{Coordinate, Tree};
 use crate::diagnostics::Diagnostic;
@@ -15,12 +16,19 @@ use std::collections::HashMap;
 
 /// Constraints of closed loops with their multipliers.
 pub(super) struct Loops {
+    /// Those that count somewhere.
     pub rows: Vec<Row>,
-    /// On velocity and on position level, one per row.
+    /// Per row the constraints it is and where (1: in force).
+    shares: Vec<Vec<(usize, Node)>>,
+    /// Per constraint a row in it.
+    labels: Vec<usize>,
+    /// Which rows are in force where they take turns.
+    pub choices: Vec<Choice>,
+    /// On velocity and on position level, one per constraint.
     pub multipliers: Vec<Symbol>,
     projections: Vec<Symbol>,
     positions: Vec<Node>,
-    /// Rate of every row.
+    /// Rate of every constraint.
     pub velocities: Vec<Node>,
     /// Per start of the study, where the loops are closed.
     pub closed: Vec<HashMap<Symbol, f64>>,
@@ -43,28 +51,49 @@ impl Loops {
         let constraints =
             Constraints { rows: &rows, positions: &positions, velocities: &velocities, upright: &upright };
         let assembly = assemble_loops(graph, study, tree, &constraints)?;
-        let rows: Vec<Row> = assembly.kept.iter().map(|&i| rows[i].clone()).collect();
+        let taken = Taken::new(graph, study, tree, &assembly, (&rows, &velocities));
+        let labels: Vec<usize> = taken.slots.iter().map(|slot| slot[0].0).collect();
         let mut symbols = |word: &str| -> Vec<Symbol> {
-            rows.iter()
-                .map(|row| graph.symbol(&format!("{}.{word}: {}", study.joints[row.joint].name, row.holds)))
-                .collect()
+            let row = |at: &usize| (&study.joints[rows[*at].joint].name, &rows[*at].holds);
+            labels.iter().map(row).map(|(joint, holds)| graph.symbol(&format!("{joint}.{word}: {holds}"))).collect()
         };
+        let [multipliers, projections] = ["reaction", "projection"].map(&mut symbols);
+        let [positions, velocities] = [&positions, &velocities].map(|nodes| taken.constraints(graph, nodes));
+        let counting: Vec<usize> = (0..rows.len()).filter(|&row| !taken.shares(row).is_empty()).collect();
         Ok(Self {
-            multipliers: symbols("reaction"),
-            projections: symbols("projection"),
-            positions: assembly.kept.iter().map(|&i| positions[i]).collect(),
-            velocities: assembly.kept.iter().map(|&i| velocities[i]).collect(),
-            rows,
+            shares: counting.iter().map(|&row| taken.shares(row)).collect(),
+            labels: labels.iter().filter_map(|label| counting.iter().position(|row| row == label)).collect(),
+            rows: counting.iter().map(|&row| rows[row].clone()).collect(),
+            choices: taken.choices,
+            multipliers,
+            projections,
+            positions,
+            velocities,
             closed: assembly.positions,
             general: assembly.general,
             warnings: assembly.warnings,
         })
     }
 
+    /// The rows with what acts along each.
+    pub fn acting<'l>(&'l self, graph: &mut Graph, multipliers: &[Symbol]) -> Vec<(&'l Row, Node)> {
+        let mut acting = Vec::new();
+        for (row, shares) in self.rows.iter().zip(&self.shares) {
+            let mut sum = graph.constant(0.0);
+            for &(constraint, in_force) in shares {
+                let multiplier = graph.variable(multipliers[constraint]);
+                let zero = graph.constant(0.0);
+                let share = graph.select(in_force, multiplier, zero);
+                sum = graph.add(sum, share);
+            }
+            acting.push((row, sum));
+        }
+        acting
+    }
+
     /// Adds what the multipliers do to the links.
     pub fn load(&self, graph: &mut Graph, frames: &[FrameMotion], multipliers: &[Symbol], wrenches: &mut [Wrench]) {
-        for (row, &multiplier) in self.rows.iter().zip(multipliers) {
-            let multiplier = graph.variable(multiplier);
+        for (row, multiplier) in self.acting(graph, multipliers) {
             for (link, wrench) in row.wrenches(graph, frames, multiplier) {
                 wrenches[link] = wrenches[link].add(graph, wrench);
             }
@@ -100,6 +129,63 @@ impl Loops {
     }
 }
 
+/// Which rows make up the constraints.
+struct Taken {
+    /// Per constraint the rows that take turns in it, with where each is in force.
+    slots: Vec<Vec<(usize, Node)>>,
+    choices: Vec<Choice>,
+}
+
+impl Taken {
+    fn new(
+        graph: &mut Graph,
+        study: &Study,
+        tree: &Tree,
+        assembly: &Assembly,
+        (rows, velocities): (&[Row], &[Node]),
+    ) -> Self {
+        let always = graph.constant(1.0);
+        let states: Vec<Symbol> =
+            tree.links.iter().filter_map(|link| link.free_symbols().map(|(velocity, _)| velocity)).collect();
+        let in_group = |row: &usize| assembly.groups.iter().any(|group| group.sets[0].contains(row));
+        let mut slots: Vec<Vec<(usize, Node)>> =
+            assembly.kept.iter().filter(|row| !in_group(row)).map(|&row| vec![(row, always)]).collect();
+        let mut choices = Vec::new();
+        for group in &assembly.groups {
+            let joint = &study.joints[rows[group.sets[0][0]].joint].name;
+            let symbol = graph.symbol(&format!("{joint}.constraints_in_force"));
+            let in_force: Vec<Node> = (0..group.sets.len()).map(|number| is_in_force(graph, symbol, number)).collect();
+            for (at, &row) in group.sets[0].iter().enumerate() {
+                if group.sets.iter().all(|set| set[at] == row) {
+                    slots.push(vec![(row, always)]);
+                } else {
+                    slots.push(group.sets.iter().zip(&in_force).map(|(set, &own)| (set[at], own)).collect());
+                }
+            }
+            choices.push(group.choice(graph, symbol, velocities, &states));
+        }
+        slots.sort_by_key(|slot| slot[0].0);
+        Self { slots, choices }
+    }
+
+    /// Per constraint the expression of the row in force.
+    fn constraints(&self, graph: &mut Graph, of_rows: &[Node]) -> Vec<Node> {
+        let constraint = |slot: &Vec<(usize, Node)>| {
+            let first = of_rows[slot[0].0];
+            slot.iter().skip(1).fold(first, |sum, &(row, in_force)| graph.select(in_force, of_rows[row], sum))
+        };
+        self.slots.iter().map(constraint).collect()
+    }
+
+    /// Constraints that a row is, and where.
+    fn shares(&self, row: usize) -> Vec<(usize, Node)> {
+        let of_slot = |(number, slot): (usize, &Vec<(usize, Node)>)| {
+            slot.iter().filter(|(own, _)| *own == row).map(|&(_, in_force)| (number, in_force)).collect::<Vec<_>>()
+        };
+        self.slots.iter().enumerate().flat_map(of_slot).collect()
+    }
+}
+
 /// Unknowns without derivative, with one equation each and its name.
 pub(super) fn algebraic_part(
     graph: &mut Graph,
@@ -117,15 +203,16 @@ pub(super) fn algebraic_part(
     };
     let is_turn = |row: &Row| matches!(row.direction, Direction::Turn(_));
     let mut algebraic = Vec::new();
-    for (row, &symbol) in loops.rows.iter().zip(&loops.multipliers) {
+    let labels: Vec<&Row> = loops.labels.iter().map(|&row| &loops.rows[row]).collect();
+    for (row, &symbol) in labels.iter().zip(&loops.multipliers) {
         algebraic.push(variable(graph, symbol, if is_turn(row) { Dimension::TORQUE } else { Dimension::FORCE }));
     }
-    for (row, &symbol) in loops.rows.iter().zip(&loops.projections) {
+    for (row, &symbol) in labels.iter().zip(&loops.projections) {
         let dimension = if is_turn(row) { Dimension::ONE / Dimension::TIME } else { Dimension::VELOCITY };
         algebraic.push(variable(graph, symbol, dimension));
     }
     let level = |word: &str| -> Vec<String> {
-        let joints = loops.rows.iter().map(|row| (&study.joints[row.joint].name, &row.holds));
+        let joints = labels.iter().map(|row| (&study.joints[row.joint].name, &row.holds));
         joints.map(|(joint, holds)| format!("{word} of `{joint}` ({holds})")).collect()
     };
     let mut names = [level("velocity constraint"), level("position constraint")].concat();

@@ -78,8 +78,8 @@ fn closing_reaction(
     loops: &Loops,
 ) -> Vector {
     let mut sum = vector::zero(graph);
-    for (row, &multiplier) in loops.rows.iter().zip(&loops.multipliers).filter(|(row, _)| row.joint == reaction.joint) {
-        let multiplier = graph.variable(multiplier);
+    let acting = loops.acting(graph, &loops.multipliers);
+    for (row, multiplier) in acting.into_iter().filter(|(row, _)| row.joint == reaction.joint) {
         let unit = row.reaction(graph, frames, reaction.is_moment);
         let share = vector::scale(graph, multiplier, unit);
         sum = vector::add(graph, sum, share);

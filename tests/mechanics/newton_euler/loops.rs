@@ -1,6 +1,7 @@
 //! Closed loops, what is redundant in them, and what keeps them from moving.
 
 use super::*;
+use crate::run::drift;
 
 #[test]
 fn spatial_four_bar_with_balls() {
@@ -88,6 +89,69 @@ fn bennett_linkage_moves_and_names_what_is_redundant() {
         warning.message.split(':').nth(1).map(|held| held.split(" about ").count() + held.split(" along ").count() - 2),
         Some(3)
     );
+}
+
+/// Driven or let go it turns all round, although no two constraints of its closing hinge are independent everywhere. Half angles of
+/// neighbouring hinges have a constant product of tangents, opposite hinges the opposite angle.
+#[test]
+fn bennett_linkage_turns_all_round() {
+    let (alpha, beta) = (30.0_f64.to_radians(), (0.8 * 0.5_f64).asin());
+    let constant = ((beta + alpha) / 2.0).sin() / ((beta - alpha) / 2.0).sin();
+    let driven = bennett().replace("ground -> l1", "ground -> l1 { motion = 3 rad/s * t + 1 rad }");
+    for (mechanism, start) in [(driven, ""), (bennett(), "{ A.position = 1, A.velocity = 6 rad/s }")] {
+        let text = format!(
+            "study b\n{mechanism}measure a = A.position\nmeasure b = B.position\nmeasure c = C.position
+             measure energy = {ENERGY}\nmanoeuvre go {{ for 3 s, start = rest {start}, step = 10 ms }}
+             criterion c = max(t / 1 s) in go\nsolver {{ tolerance = 1e-10 }}\n",
+        );
+        let own = &run(&text, &[])[0];
+        assert!(own["a"].last().expect("samples") - own["a"][0] > 8.0, "all round and further");
+        for ((a, b), c) in own["a"].iter().zip(&own["b"]).zip(&own["c"]) {
+            // Multiplied by the cosines: no pole.
+            let [(sa, ca), (sb, cb)] = [a, b].map(|angle| (angle / 2.0).sin_cos());
+            assert!((sa * sb - constant * ca * cb).abs() < 1e-7 * constant.abs(), "at {a}, {b}");
+            assert!((a + c).abs() < 1e-7, "{a} and {c}");
+        }
+        if !start.is_empty() {
+            assert!(drift(&own["energy"]) < 1e-7 * own["energy"][0], "drift {}", drift(&own["energy"]));
+        }
+    }
+}
+
+/// Of the three moving links of Bennett's linkage.
+const ENERGY: &str = "0.5 * ((l1.centre_of_gravity.velocity.x^2 + l1.centre_of_gravity.velocity.y^2 + l1.centre_of_gravity.velocity.z^2 \
+    + l2.centre_of_gravity.velocity.x^2 + l2.centre_of_gravity.velocity.y^2 + l2.centre_of_gravity.velocity.z^2 \
+    + l3.centre_of_gravity.velocity.x^2 + l3.centre_of_gravity.velocity.y^2 + l3.centre_of_gravity.velocity.z^2) / (1 m/s)^2 \
+    + 0.01 * (l1.angular_velocity.x^2 + l1.angular_velocity.y^2 + l1.angular_velocity.z^2 \
+    + l2.angular_velocity.x^2 + l2.angular_velocity.y^2 + l2.angular_velocity.z^2 \
+    + l3.angular_velocity.x^2 + l3.angular_velocity.y^2 + l3.angular_velocity.z^2) / (1 rad/s)^2)";
+
+/// Bricard's orthogonal six-bar with threefold symmetry: alternate hinges move alike, and neighbours such that
+/// `cos a cos b + cos a + cos b = 0`.
+#[test]
+fn bricard_linkage_turns_all_round() {
+    let hinge = |at: usize, from: &str, to: &str| {
+        let (axis, angle) = if at % 2 == 1 { ("0, -1, 0", 90) } else { ("0, 1, 0", -90) };
+        format!("joint j[{at}]: revolute({axis}) {from} -> {to} {{ orientation = ({angle} deg, 0 deg, 0 deg) }}\n")
+    };
+    let hinges: String = (1..5).map(|at| hinge(at, &format!("l[{at}].tip"), &format!("l[{}]", at + 1))).collect();
+    let text = format!(
+        "study b\nbody ground {{ point far = (-0.1 m, 0 m, 0 m) }}
+         for i in 1 .. 5 {{ body l[i] {{ mass = 1 kg, inertia = 0.001 kg*m^2, point tip = (0.1 m, 0 m, 0 m) }} }}
+         joint j[0]: revolute(z) ground -> l[1]\n{hinges}joint j[5]: revolute(0, -1, 0) l[5].tip -> ground.far
+         for i in 0 .. 4 {{ measure q[i] = j[i].position }}
+         manoeuvre go {{ for 3 s, step = 10 ms, start = rest {{ j[0].position = 1.8 rad, j[1].position = 1.27 rad, j[2].position = 1.8 rad, j[0].velocity = 3 rad/s }} }}
+         criterion c = max(t / 1 s) in go\nsolver {{ tolerance = 1e-10 }}\n"
+    );
+    let own = &run(&text, &[])[0];
+    let reached = own["q[0]"].iter().fold((0.0_f64, 0.0_f64), |(low, high), q| (low.min(*q), high.max(*q)));
+    assert!(reached.0 < -2.0 && reached.1 > 2.0, "both ends are passed: {reached:?}");
+    for k in 0..own["q[0]"].len() {
+        let q: Vec<f64> = (0..5).map(|i| own[format!("q[{i}]").as_str()][k]).collect();
+        let (a, b) = (q[0].cos(), q[1].cos());
+        assert!((a * b + a + b).abs() < 1e-7, "{q:?}");
+        assert!((q[0] - q[2]).abs() < 1e-6 && (q[1] - q[3]).abs() < 1e-6 && (q[0] - q[4]).abs() < 1e-6, "{q:?}");
+    }
 }
 
 /// An upright on five rods, carried by a free joint.
