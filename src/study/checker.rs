@@ -232,7 +232,7 @@ impl<'a> Checker<'a> {
     }
 
     /// Whether the name could not be written out, so that it is missing for a reason reported already.
-    fn is_broken(&self, name: &str) -> bool {
+    pub fn is_broken(&self, name: &str) -> bool {
         let mut owners = name.match_indices(['.', '[']).map(|(at, _)| &name[..at]).chain([name]);
         name.is_empty() || self.declared.broken.is_some_and(|broken| owners.any(|owner| broken.contains(owner)))
     }

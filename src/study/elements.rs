@@ -193,7 +193,17 @@ impl<'a> Checker<'a> {
         self.fail(diagnostic, SCOPE)
     }
 
+    /// The name leads into a joint whose own declaration is wrong, which has been said already.
+    pub(super) fn is_of_wrong_joint(&self, name: &str) -> bool {
+        let joints = self.declared.joints.iter().zip(&self.topology.joints);
+        let mut wrong = joints.filter(|(_, read)| read.is_none()).map(|(joint, _)| joint.name.text.as_str());
+        wrong.any(|joint| name.strip_prefix(joint).is_some_and(|rest| rest.is_empty() || rest.starts_with('.')))
+    }
+
     fn no_joint<T>(&mut self, name: &'a Name, entity: Option<Entity>) -> Option<T> {
+        if self.is_of_wrong_joint(&name.text) {
+            return None;
+        }
         let mut axes: Vec<&str> = self.axis_index.keys().map(String::as_str).collect();
         axes.sort_unstable();
         let similar = similar_name(&name.text, axes);

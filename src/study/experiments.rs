@@ -241,6 +241,9 @@ impl<'a> Checker<'a> {
             return self.fail(diagnostic, SCOPE);
         }
         let Some((symbol, dimension)) = self.start_target(&field.path) else {
+            if self.is_of_wrong_joint(&field.path) || self.is_broken(&field.path) {
+                return None;
+            }
             let message = format!("`{}` has no start value", field.path);
             let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, message)
                 .label(field.span, "not a position, velocity or state")

@@ -177,8 +177,12 @@ impl<'a> Checker<'a> {
             };
             // Turns about one axis with another turn between them are different freedoms (Euler angles).
             let before = &motions[..at];
+            // So are shifts along one axis, unless the turns between them leave that axis where it is.
+            let turns_away = |other: &Motion| {
+                matches!(other.0, AxisMotion::Turn(_)) && !is_parallel(other.0.direction(), motion.direction())
+            };
             let is_repeated = match motion {
-                AxisMotion::Shift(_) => before.iter().any(same),
+                AxisMotion::Shift(_) => before.iter().rev().take_while(|other| !turns_away(other)).any(same),
                 AxisMotion::Turn(_) => {
                     before.iter().rev().find(|other| matches!(other.0, AxisMotion::Turn(_))).is_some_and(same)
                 }
@@ -187,7 +191,8 @@ impl<'a> Checker<'a> {
                 let span =
                     declared.axes.get(at).or(declared.axes.last()).map_or(declared.kind.span, |a| a.direction.span);
                 let diagnostic = Diagnostic::error(Code::AXIS, "two axes of the joint are parallel")
-                    .label(span, "the same freedom twice");
+                    .label(span, "the same freedom twice")
+                    .help("remove one; with a turn about another axis between them they are two freedoms");
                 return self.fail(diagnostic, SCOPE);
             }
         }
