@@ -1,7 +1,9 @@
 //! The arena of nodes.
 
+use super::curve::Curve;
 use rustc_hash::FxHashMap;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// A node of a [`Graph`]; meaningless without it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -63,7 +65,8 @@ pub enum Operation {
         otherwise: Node,
     },
     /// The `order`-th time derivative of sampled input channel `input`, at an arbitrary time argument, so that
-    /// a delayed input is `Sample { time: t - delay }` and differentiable with respect to the delay.
+    /// a delayed input is `Sample { time: t - delay }` and differentiable with respect to the delay. From [`CURVES`] on the
+    /// channels are the curves of the graph, functions of any argument.
     Sample {
         input: u32,
         order: u8,
@@ -79,6 +82,17 @@ pub struct Graph {
     index: FxHashMap<Operation, Node>,
     symbol_names: Vec<String>,
     symbol_index: FxHashMap<String, Symbol>,
+    curves: Vec<Arc<Curve>>,
+}
+
+/// Channels of [`Operation::Sample`] from here on are curves.
+pub const CURVES: u32 = 1 << 30;
+/// Channels from here on are no curves.
+const CURVES_END: u32 = 1 << 31;
+
+/// The curve that a channel of samples means.
+pub fn curve_of(curves: &[Arc<Curve>], channel: u32) -> Option<&Arc<Curve>> {
+    (CURVES..CURVES_END).contains(&channel).then(|| curves.get((channel - CURVES) as usize))?
 }
 
 impl Graph {
@@ -176,7 +190,32 @@ impl Graph {
 
     /// See [`Operation::Sample`].
     pub fn sample(&mut self, input: u32, order: u8, time: Node) -> Node {
+        if let Some(curve) = self.curve(input) {
+            let known = if order > curve.degree {
+                Some(0.0)
+            } else {
+                self.constant_value(time).map(|x| curve.evaluate(x, order))
+            };
+            if let Some(value) = known {
+                return self.constant(value);
+            }
+        }
         self.intern(Operation::Sample { input, order, time })
+    }
+
+    /// Takes a curve in; the channel by which [`Graph::sample`] means it.
+    pub fn add_curve(&mut self, curve: Curve) -> u32 {
+        self.curves.push(Arc::new(curve));
+        CURVES + (self.curves.len() - 1) as u32
+    }
+
+    pub fn curve(&self, channel: u32) -> Option<&Arc<Curve>> {
+        curve_of(&self.curves, channel)
+    }
+
+    /// All curves, by channel from [`CURVES`] on.
+    pub fn curves(&self) -> &[Arc<Curve>] {
+        &self.curves
     }
 
     /// The node for an operation as it stands, without simplification.
@@ -242,6 +281,7 @@ impl Graph {
             index: FxHashMap::with_capacity_and_hasher(2 * needed.len(), Default::default()),
             symbol_names: self.symbol_names.clone(),
             symbol_index: self.symbol_index.clone(),
+            curves: self.curves.clone(),
         };
         let mut image: Vec<Node> = vec![Node(0); self.operations.len()];
         for node in needed {
@@ -269,7 +309,10 @@ impl Graph {
                 Operation::Select { condition, then, otherwise } => {
                     value[if value[condition.index()] != 0.0 { then } else { otherwise }.index()]
                 }
-                Operation::Sample { input, order, time } => sample(input, order, value[time.index()]),
+                Operation::Sample { input, order, time } => match self.curve(input) {
+                    Some(curve) => curve.evaluate(value[time.index()], order),
+                    None => sample(input, order, value[time.index()]),
+                },
             };
         }
         roots.iter().map(|root| value[root.index()]).collect()

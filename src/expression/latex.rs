@@ -62,7 +62,8 @@ impl<'a> LatexPrinter<'a> {
                 (text, Binding::Sum)
             }
             Operation::Sample { input, order, time } => {
-                let name = self.input_names.get(input as usize).map_or("input", String::as_str);
+                let curve = self.graph.curve(input).map(|curve| curve.name.as_str());
+                let name = curve.or(self.input_names.get(input as usize).map(String::as_str)).unwrap_or("input");
                 let primes = "'".repeat(order.into());
                 (format!(r"{}{primes}\left({}\right)", latex_name(name), self.text(time)), Binding::Atom)
             }

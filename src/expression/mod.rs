@@ -8,6 +8,7 @@
 //! Equal subexpressions are one node by construction; simplification happens when a node is built
 //! ([`Graph`] applies the rules of `simplify`), so there is no unsimplified form to forget about.
 
+mod curve;
 mod differentiate;
 mod graph;
 mod latex;
@@ -17,7 +18,8 @@ mod properties;
 mod simplify;
 pub(crate) mod vector;
 
+pub use curve::{Beyond, Curve};
 pub use differentiate::Entry;
-pub use graph::{Binary, Graph, Node, Operation, Symbol, Unary};
+pub use graph::{Binary, CURVES, Graph, Node, Operation, Symbol, Unary, curve_of};
 pub use latex::{LatexPrinter, latex_name};
 pub use print::Printer;

@@ -108,7 +108,8 @@ impl<'a> Printer<'a> {
                 (format!("if {condition} then {then} else {otherwise}"), Binding::Choice)
             }
             Operation::Sample { input, order, time } => {
-                let name = self.input_names.get(input as usize).map_or("input", String::as_str);
+                let curve = self.graph.curve(input).map(|curve| curve.name.as_str());
+                let name = curve.or(self.input_names.get(input as usize).map(String::as_str)).unwrap_or("input");
                 (format!("{name}{}({})", "'".repeat(order.into()), self.text(time)), Binding::Atom)
             }
         }

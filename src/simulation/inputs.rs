@@ -78,6 +78,14 @@ impl Formula {
                     let turned = own.multiply(pi, a);
                     own.unary(Unary::Sin, turned)
                 }
+                Operation::Sample { input, order: 0, time } => {
+                    let kinks = self.graph.curve(input).map(|curve| curve.kinks()).unwrap_or_default();
+                    for kink in kinks {
+                        let kink = own.constant(kink);
+                        switches.push(own.subtract(time, kink));
+                    }
+                    continue;
+                }
                 _ => continue,
             };
             if own.symbols_of(&[switch]).contains(&self.time) {

@@ -31,7 +31,7 @@ pub struct Loaded {
 }
 
 /// Larger files of tables are refused.
-const LARGEST_TABLE: u64 = 4 << 20;
+const LARGEST_TABLE: u64 = 128 << 20;
 
 static PRELUDE_LOADED: LazyLock<Loaded> = LazyLock::new(|| {
     let mut loaded = Loaded {

@@ -8,7 +8,7 @@ use super::fields::find;
 use super::model::{Criterion, Manoeuvre, Start, StartBase, Statistic};
 use super::units::read_unit;
 use crate::diagnostics::{Code, Diagnostic, similar_name};
-use crate::expression::Node;
+use crate::expression::{Node, Operation};
 use crate::quantities::{Dimension, Unit};
 use crate::syntax::{Expression, ExpressionKind, Field, Name};
 
@@ -142,7 +142,7 @@ impl<'a> Checker<'a> {
             .graph
             .reachable(&[value.node])
             .into_iter()
-            .any(|node| matches!(self.graph.operation(node), crate::expression::Operation::Sample { .. }));
+            .any(|node| matches!(self.graph.operation(node), Operation::Sample { input, .. } if self.graph.curve(input).is_none()));
         let foreign = symbols.into_iter().find(|symbol| *symbol != self.time);
         let on = match foreign {
             Some(symbol) => self.graph.symbol_name(symbol).to_owned(),

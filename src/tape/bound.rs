@@ -1,9 +1,9 @@
 //! Evaluation of a model for one parameter vector and one set of inputs.
 
-use super::InputSource;
 use super::expansion::Memory;
 use super::model::{Element, Model};
 use super::sweep::Scratch;
+use super::{InputSource, Sources};
 use crate::integrate::{Dynamics, ResetDerivatives, SwitchDerivatives};
 use crate::linear::SparsityPattern;
 
@@ -12,7 +12,7 @@ use crate::linear::SparsityPattern;
 /// `n` variables (states, then algebraic ones), `p` parameters, `m` outputs; all matrices column-major, all values SI.
 pub struct Bound<'a> {
     pub(super) model: &'a Model,
-    pub(super) inputs: &'a dyn InputSource,
+    pub(super) inputs: Sources<'a>,
     pub(super) registers: Vec<f64>,
     /// Whether the registers hold the rates at the time and variables that stand in them.
     is_current: bool,
@@ -37,7 +37,7 @@ impl<'a> Bound<'a> {
     pub fn new(model: &'a Model, inputs: &'a dyn InputSource, theta: &[f64]) -> Self {
         let mut bound = Self {
             model,
-            inputs,
+            inputs: Sources { curves: &model.curves, inputs },
             registers: model.registers.clone(),
             is_current: false,
             parameter_scale: Vec::new(),
@@ -54,7 +54,7 @@ impl<'a> Bound<'a> {
         for i in 0..self.model.parameter_count() {
             self.registers[first + i] = theta.get(i).copied().unwrap_or(f64::NAN);
         }
-        self.model.prologue.execute(&mut self.registers, self.inputs);
+        self.model.prologue.execute(&mut self.registers, &self.inputs);
         self.is_current = false;
     }
 
@@ -80,14 +80,14 @@ impl<'a> Bound<'a> {
         let same_time = self.is_current && self.registers[layout.time].to_bits() == t.to_bits();
         if !same_time {
             self.registers[layout.time] = t;
-            self.model.forcing.execute(&mut self.registers, self.inputs);
+            self.model.forcing.execute(&mut self.registers, &self.inputs);
         }
         let variables = &mut self.registers[layout.variables..layout.variables + self.model.variables.len()];
         // Without early exit: a few vector instructions.
         let same_variables = variables.iter().zip(y).fold(0, |bits, (a, b)| bits | (a.to_bits() ^ b.to_bits())) == 0;
         if !(same_time && same_variables) {
             variables.copy_from_slice(y);
-            self.model.rates.execute(&mut self.registers, self.inputs);
+            self.model.rates.execute(&mut self.registers, &self.inputs);
         }
         self.is_current = true;
     }
@@ -98,7 +98,7 @@ impl<'a> Bound<'a> {
         self.registers[layout.time] = t;
         self.registers[layout.variables..layout.variables + self.model.variables.len()].copy_from_slice(y);
         self.is_current = false;
-        self.model.outputs.execute(&mut self.registers, self.inputs);
+        self.model.outputs.execute(&mut self.registers, &self.inputs);
     }
 
     /// The measured channels, length m.
@@ -135,16 +135,16 @@ impl<'a> Bound<'a> {
 
     fn evaluate_output_derivatives(&mut self, t: f64, y: &[f64]) {
         self.update_outputs(t, y);
-        self.model.output_by_state.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
+        self.model.output_by_state.evaluate(&mut self.registers, &self.inputs, &mut self.scratch);
         if self.model.output_by_parameter.sweep.is_some() {
-            self.model.output_by_parameter.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
+            self.model.output_by_parameter.evaluate(&mut self.registers, &self.inputs, &mut self.scratch);
         }
     }
 
     /// The probes of the system, in its order.
     pub fn probes(&mut self, t: f64, y: &[f64], out: &mut [f64]) {
         self.update(t, y);
-        self.model.probes.execute(&mut self.registers, self.inputs);
+        self.model.probes.execute(&mut self.registers, &self.inputs);
         self.gather(&self.model.probe_registers, out);
     }
 
@@ -157,7 +157,7 @@ impl<'a> Bound<'a> {
         let Some(program) = self.model.starts.get(experiment) else { return start };
         self.is_current = false;
         self.registers[self.model.layout.time] = t0;
-        program.program.execute(&mut self.registers, self.inputs);
+        program.program.execute(&mut self.registers, &self.inputs);
         for (state, register) in program.values.iter().enumerate() {
             if let Some(register) = register {
                 start.values[state] = self.registers[*register as usize];
@@ -219,7 +219,7 @@ impl Dynamics for Bound<'_> {
 
     fn jacobian(&mut self, t: f64, y: &[f64], _y_prime: &[f64], c: f64, values: &mut [f64]) {
         self.update(t, y);
-        self.model.jacobian.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
+        self.model.jacobian.evaluate(&mut self.registers, &self.inputs, &mut self.scratch);
         self.model.jacobian_sources.gather(&self.registers, values);
         for &slot in &self.model.diagonal {
             values[slot as usize] += c;
@@ -234,13 +234,13 @@ impl Dynamics for Bound<'_> {
         self.update(t, y);
         if let (Some(expansion), Some(sweep)) = (&self.model.expansion, &self.model.jacobian.sweep) {
             let memory = (&mut self.scratch, &mut self.memory);
-            expansion.evaluate((sweep, &self.registers, self.inputs), memory, (scale, c), values);
+            expansion.evaluate((sweep, &self.registers, &self.inputs), memory, (scale, c), values);
         }
     }
 
     fn parameter_derivative(&mut self, t: f64, y: &[f64], _y_prime: &[f64], values: &mut [f64]) {
         self.update(t, y);
-        self.model.parameter_derivative.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
+        self.model.parameter_derivative.evaluate(&mut self.registers, &self.inputs, &mut self.scratch);
         let n = self.model.dimension();
         values.fill(0.0);
         for element in &self.model.parameter_derivative.elements {
@@ -256,7 +256,7 @@ impl Dynamics for Bound<'_> {
 
     fn parameter_entries(&mut self, t: f64, y: &[f64], _y_prime: &[f64], values: &mut [f64]) {
         self.update(t, y);
-        self.model.parameter_derivative.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
+        self.model.parameter_derivative.evaluate(&mut self.registers, &self.inputs, &mut self.scratch);
         self.model.parameter_sources.gather(&self.registers, values);
     }
 

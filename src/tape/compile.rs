@@ -139,6 +139,7 @@ impl Model {
         registers.resize(assembler.next, 0.0);
         debug_assert_eq!(p, system.parameter_names.len());
         Model {
+            curves: system.graph.curves().to_vec(),
             state_count,
             constraint_names: system.constraint_names.clone(),
             parameter_names: system.parameter_names.clone(),

@@ -44,7 +44,7 @@ impl Events {
 impl Bound<'_> {
     fn update_events(&mut self, t: f64, y: &[f64]) {
         self.update(t, y);
-        self.model.events.program.execute(&mut self.registers, self.inputs);
+        self.model.events.program.execute(&mut self.registers, &self.inputs);
     }
 
     pub(super) fn evaluate_switches(&mut self, t: f64, y: &[f64], values: &mut [f64]) {
@@ -102,7 +102,7 @@ impl Bound<'_> {
     fn rows_of_events(&mut self, t: f64, y: &[f64], rows: &[u32], mut take: impl FnMut(usize, Column, f64)) {
         self.update_events(t, y);
         let model = self.model;
-        model.events.derivative.evaluate(&mut self.registers, self.inputs, &mut self.scratch);
+        model.events.derivative.evaluate(&mut self.registers, &self.inputs, &mut self.scratch);
         let (n, p) = (model.dimension(), model.parameter_count());
         for element in &model.events.derivative.elements {
             let Some(at) = rows.iter().position(|row| *row == element.row) else { continue };

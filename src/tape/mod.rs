@@ -25,6 +25,9 @@ mod slopes;
 mod sweep;
 mod tangent;
 
+use crate::expression::{Curve, curve_of};
+use std::sync::Arc;
+
 pub use bound::{Bound, StartValues};
 pub use emit::emit_tape;
 pub use model::{DerivativeForm, Model};
@@ -34,4 +37,19 @@ pub use tangent::Tangent;
 pub trait InputSource: Sync {
     /// The `order`-th time derivative of input channel `input` (index in the study's inputs) at time `t`, SI.
     fn sample(&self, input: u32, order: u8, t: f64) -> f64;
+}
+
+/// The inputs with the curves of the model.
+struct Sources<'a> {
+    curves: &'a [Arc<Curve>],
+    inputs: &'a dyn InputSource,
+}
+
+impl InputSource for Sources<'_> {
+    fn sample(&self, input: u32, order: u8, t: f64) -> f64 {
+        match curve_of(self.curves, input) {
+            Some(curve) => curve.evaluate(t, order),
+            None => self.inputs.sample(input, order, t),
+        }
+    }
 }

@@ -16,6 +16,7 @@ pub struct Model {
     /// States, then algebraic variables.
     pub(super) variables: Vec<Variable>,
     pub(super) state_count: usize,
+    pub(super) curves: Vec<std::sync::Arc<crate::expression::Curve>>,
     pub(super) constraint_names: Vec<String>,
     pub(super) parameter_names: Vec<String>,
     pub(super) output_names: Vec<String>,

@@ -46,7 +46,7 @@ impl Bound<'_> {
         let mut slopes = vec![0.0; self.registers.len()];
         let first = self.model.layout.parameters;
         slopes[first..first + direction.len()].copy_from_slice(direction);
-        self.model.prologue.tangent(&self.registers, &mut slopes, self.inputs);
+        self.model.prologue.tangent(&self.registers, &mut slopes, &self.inputs);
         Tangent { slopes, time: None }
     }
 
@@ -61,12 +61,12 @@ impl Bound<'_> {
     ) {
         self.update(t, y);
         if tangent.time != Some(t.to_bits()) {
-            self.model.forcing.tangent(&self.registers, &mut tangent.slopes, self.inputs);
+            self.model.forcing.tangent(&self.registers, &mut tangent.slopes, &self.inputs);
             tangent.time = Some(t.to_bits());
         }
         let first = self.model.layout.variables;
         tangent.slopes[first..first + y_slopes.len()].copy_from_slice(y_slopes);
-        self.model.rates.tangent(&self.registers, &mut tangent.slopes, self.inputs);
+        self.model.rates.tangent(&self.registers, &mut tangent.slopes, &self.inputs);
         for ((value, slope), &register) in values.iter_mut().zip(slopes).zip(&self.model.rate_registers) {
             *value = self.registers[register as usize];
             *slope = tangent.slopes[register as usize];
@@ -84,7 +84,7 @@ impl Bound<'_> {
         self.update_outputs(t, y);
         let first = self.model.layout.variables;
         tangent.slopes[first..first + y_slopes.len()].copy_from_slice(y_slopes);
-        self.model.outputs.tangent(&self.registers, &mut tangent.slopes, self.inputs);
+        self.model.outputs.tangent(&self.registers, &mut tangent.slopes, &self.inputs);
         for (slope, &register) in slopes.iter_mut().zip(&self.model.output_registers) {
             *slope = tangent.slopes[register as usize];
         }

@@ -38,6 +38,9 @@ pub fn value(study: &Study, node: Node, values: &[(&str, f64)]) -> f64 {
                     known[&otherwise]
                 }
             }
+            Operation::Sample { input, order, time } if study.graph.curve(input).is_some() => {
+                study.graph.curve(input).expect("a curve").evaluate(known[&time], order)
+            }
             Operation::Sample { input, order, time } => {
                 let omega = f64::from(input) + 1.0;
                 let phase = omega * known[&time] + f64::from(order) * std::f64::consts::FRAC_PI_2;

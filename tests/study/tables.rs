@@ -140,6 +140,49 @@ fn long_tables_are_treated() {
     close(value(&study, height, &[("t", 0.125 + 16.0 / 20.0)]), 1.6e-3);
 }
 
+/// A record of hundreds of thousands of points is no part of the equations: it compiles as fast as a short one and is run over.
+#[test]
+fn records_of_any_length_are_treated() {
+    use ident::simulation::{Compiled, Gradient, manoeuvre, simulate};
+    let folder = tempfile::tempdir().expect("a folder");
+    let height = |s: f64| 0.01 * (3.0 * s).sin();
+    let rows: String =
+        (0..=200_000).map(|k| 0.0005 * f64::from(k)).map(|s| format!("{s},{:e}\n", 1e3 * height(s))).collect();
+    fs::write(folder.path().join("track.csv"), format!("s [m],z [mm]\n{rows}")).expect("writable folder");
+    let path = folder.path().join("s.ident");
+    let text = "study s
+        input u [mm]
+        table track(s: length) -> length { file = \"track.csv\", interpolation = cubic, extrapolation = error }
+        body b { mass = 2 kg }
+        joint guide: prismatic(z) ground -> b
+        signal way: travelled { speed = 20 m/s }
+        force contact: following_spring on guide { stiffness = 200 N/m, height = track(way) }
+        measure h [m] = track(way)
+        measure direct [m] = u
+        measure z [m] = guide.position
+        manoeuvre go { u = track(20 m/s * t), for 4 s, step = 10 ms, start = rest }
+        criterion c = max(guide.position) in go
+        solver { tolerance = 1e-9 }";
+    fs::write(&path, text).expect("writable folder");
+    let checked = check(&load(&path), None).unwrap_or_else(|findings| panic!("{findings:?}"));
+    let compiled = Compiled::new(checked.study).unwrap_or_else(|findings| panic!("{findings:?}"));
+    assert!(compiled.system.graph.len() < 1000, "{} nodes", compiled.system.graph.len());
+    let mut record = manoeuvre(&compiled.study, 0);
+    record.measures = vec![0, 1, 2];
+    let run = simulate(&compiled, &record, &[], Gradient::None).unwrap_or_else(|failure| panic!("{failure:?}"));
+    // z'' + 100 z = 100 h(20 t) from rest.
+    let (own, forced) = (10.0_f64, 60.0_f64);
+    let amplitude = 0.01 * own * own / (own * own - forced * forced);
+    for (k, t) in record.times.iter().enumerate() {
+        let z = amplitude * ((forced * t).sin() - forced / own * (own * t).sin());
+        assert!(
+            (run.channels[0][k] - height(20.0 * t)).abs() < 1e-9
+                && (run.channels[1][k] - height(20.0 * t)).abs() < 1e-9
+        );
+        assert!((run.channels[2][k] - z).abs() < 1e-7, "at {t}: {} instead of {z}", run.channels[2][k]);
+    }
+}
+
 /// A run that starts exactly where the table begins, and one that comes back there and leaves it.
 #[test]
 fn runs_start_at_the_edge_of_a_table() {

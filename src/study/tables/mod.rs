@@ -1,7 +1,7 @@
 //! Tables: characteristic curves as functions of one argument, and surfaces over two, lowered to expressions.
 //!
-//! *In*: declarations with points in the text or in a file. *Out*: choices between polynomials over a balanced tree, so
-//! that derivatives follow. *Must not happen here*: reading of files (they are loaded with the study).
+//! *In*: declarations with points in the text or in a file. *Out*: curves as data of the graph; of surfaces choices between
+//! polynomials over a balanced tree, so that derivatives follow. *Must not happen here*: reading of files (they are loaded with the study).
 
 mod curve;
 mod file;
@@ -17,26 +17,18 @@ use super::identify::written_unit;
 use super::kinds::{Form, Kinds};
 use super::model::Motion;
 use crate::diagnostics::{Code, Diagnostic, Span};
-use crate::expression::Node;
+use crate::expression::{Beyond, Curve, Node};
 use crate::quantities::Dimension;
 use crate::syntax::{Expression, Name, TableDeclaration, Value};
 use curve::Shape;
-use polynomials::{Piecewise, constants};
 use surface::Surface;
 
 const SCOPE: Scope = Scope::Study(Allowed::Number);
 
-/// More points are refused: every one is part of the equations.
-const MOST_POINTS: usize = 5_000;
-/// Likewise of surfaces, whose points take several terms each.
+/// More points are refused: a mistaken file.
+const MOST_POINTS: usize = 5_000_000;
+/// Points of surfaces take several terms of the equations each.
 const MOST_POINTS_OF_SURFACES: usize = 1_600;
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Beyond {
-    Constant,
-    Linear,
-    Error,
-}
 
 /// Points in SI units, arguments first, with the dimensions of arguments and values.
 type Points = (Vec<Vec<f64>>, Vec<Dimension>);
@@ -49,12 +41,8 @@ pub(super) struct Table {
 }
 
 enum TableShape {
-    /// Arguments grow.
-    Pieces {
-        arguments: Vec<f64>,
-        pieces: Vec<[f64; 4]>,
-        beyond: Beyond,
-    },
+    /// A curve of the graph, by its channel.
+    Curve(u32),
     Sum(Vec<series::Component>),
     Surface(Surface),
 }
@@ -105,12 +93,13 @@ impl<'a> Checker<'a> {
         let beyond = match beyond {
             "constant" => Beyond::Constant,
             "linear" => Beyond::Linear,
-            _ => Beyond::Error,
+            _ => Beyond::Undefined,
         };
         let shape = if count == 1 {
             let points: Vec<(f64, f64)> = points.iter().map(|point| (point[0], point[1])).collect();
             let pieces = curve::pieces(&points, shape);
-            TableShape::Pieces { arguments: points.iter().map(|point| point.0).collect(), pieces, beyond }
+            let knots = points.iter().map(|point| point.0).collect();
+            TableShape::Curve(self.graph.add_curve(Curve::new(&table.name.text, knots, pieces, beyond)))
         } else {
             match Surface::new(&points, shape, beyond) {
                 Ok(surface) => TableShape::Surface(surface),
@@ -293,10 +282,7 @@ impl<'a> Checker<'a> {
         let table = self.tables.get(name)?.as_ref()?;
         let graph = &mut self.graph;
         match (&table.shape, arguments) {
-            (TableShape::Pieces { arguments, pieces, beyond }, &[x]) => {
-                let pieces = constants(graph, pieces);
-                Piecewise { arguments, pieces: &pieces, beyond: *beyond }.at(graph, x)
-            }
+            (TableShape::Curve(channel), &[x]) => Some(graph.sample(*channel, 0, x)),
             (TableShape::Sum(components), &[x]) => Some(series::sum(graph, components, x)),
             (TableShape::Surface(surface), &[x, y]) => surface.at(graph, [x, y]),
             _ => None,

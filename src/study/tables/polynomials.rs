@@ -1,7 +1,6 @@
 //! Piecewise polynomials as expressions: choices over a balanced tree, so that derivatives follow.
 
-use super::Beyond;
-use crate::expression::{Binary, Graph, Node};
+use crate::expression::{Beyond, Binary, Graph, Node};
 
 /// A function of one argument: pieces in powers of the distance from where each begins, whose coefficients may be functions of
 /// another argument. `arguments` has one more entry.

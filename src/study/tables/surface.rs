@@ -1,9 +1,8 @@
 //! Tables of two arguments: values on a grid, interpolated along both (the tensor product of the curves, Boor-2001).
 
-use super::Beyond;
 use super::curve::{self, Shape};
 use super::polynomials::{Piecewise, constants};
-use crate::expression::{Graph, Node};
+use crate::expression::{Beyond, Graph, Node};
 
 /// Values over a grid.
 pub(super) struct Surface {
