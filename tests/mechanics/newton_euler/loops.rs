@@ -146,8 +146,9 @@ fn bricard_linkage_turns_all_round() {
     let own = &run(&text, &[])[0];
     let reached = own["q[0]"].iter().fold((0.0_f64, 0.0_f64), |(low, high), q| (low.min(*q), high.max(*q)));
     assert!(reached.0 < -2.0 && reached.1 > 2.0, "both ends are passed: {reached:?}");
-    for k in 0..own["q[0]"].len() {
-        let q: Vec<f64> = (0..5).map(|i| own[format!("q[{i}]").as_str()][k]).collect();
+    let angles: Vec<&Vec<f64>> = (0..5).map(|i| &own[format!("q[{i}]").as_str()]).collect();
+    for k in 0..angles[0].len() {
+        let q: Vec<f64> = angles.iter().map(|values| values[k]).collect();
         let (a, b) = (q[0].cos(), q[1].cos());
         assert!((a * b + a + b).abs() < 1e-7, "{q:?}");
         assert!((q[0] - q[2]).abs() < 1e-6 && (q[1] - q[3]).abs() < 1e-6 && (q[0] - q[4]).abs() < 1e-6, "{q:?}");
