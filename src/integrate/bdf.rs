@@ -8,7 +8,7 @@ use super::augmented::Augmented;
 use super::bdf_history::{History, MAXIMUM_ORDER};
 use super::newton::{Newton, NewtonFailure, StepEnd};
 use super::norm::{ErrorNorm, Size};
-use super::problem::{Dynamics, FailureCause, PlannedStep};
+use super::problem::{Branches, Dynamics, FailureCause, PlannedStep};
 use super::stepper::{Limits, Refusal, first_not_finite};
 
 /// Share of the step kept after a failed solution of the implicit equations.
@@ -351,7 +351,7 @@ impl Bdf {
     ) -> PlannedStep {
         system.work.steps += 1;
         let k = self.history.order;
-        let planned = PlannedStep { end, order: k as u8 };
+        let planned = PlannedStep { end, order: k as u8, branches: Branches::Free };
         let order_change = k as i64 - self.history.last_order as i64;
         let fresh = self.history.is_fresh();
         if choice.order < k || k == MAXIMUM_ORDER {

@@ -14,6 +14,7 @@ mod equilibrium;
 mod equilibrium_sparse;
 mod events;
 mod iteration_matrix;
+mod kinks;
 mod newton;
 mod norm;
 mod problem;
@@ -76,6 +77,7 @@ pub fn integrate<D: Dynamics + ?Sized>(
             Some(plan) => run.follow(plan, planned, end, discontinuous).map(|next| planned = next),
             None => run.segment(end, discontinuous),
         };
+        run.release_kinks();
         if let Err(refusal) = outcome.and_then(|()| run.tick(&segment.clocks)) {
             return Err(refusal.with_work(run.system.work));
         }

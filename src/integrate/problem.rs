@@ -87,6 +87,18 @@ pub trait Dynamics {
         true
     }
 
+    /// Number of functions at whose zeros the right-hand side may have a kink although no event is declared there.
+    fn kink_count(&self) -> usize {
+        0
+    }
+
+    /// Values of these functions.
+    fn kinks(&mut self, _t: f64, _y: &[f64], _values: &mut [f64]) {}
+
+    /// From now on the right-hand side and its derivatives are those of one side of each kink, whatever the function's value:
+    /// that of negative values where true. They are smooth then. Without sides the values decide again.
+    fn hold_sides(&mut self, _sides: Option<&[bool]>) {}
+
     /// Number of switching functions: as long as none changes its sign, the right-hand side is smooth.
     fn switch_count(&self) -> usize {
         0
@@ -207,12 +219,25 @@ pub struct Plan {
     pub steps: Vec<PlannedStep>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PlannedStep {
     /// Time at the end of the step.
     pub end: f64,
     /// Order of the BDF; 0 for an explicit step of order 5, 8 for one of order 8.
     pub order: u8,
+    pub branches: Branches,
+}
+
+/// How the sides of kinks are chosen in a step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Branches {
+    /// By the values, stage by stage.
+    #[default]
+    Free,
+    /// Likewise, after a step back from a kink that was not crossed.
+    Freed,
+    /// As they are listed ([`Dynamics::hold_sides`]).
+    Held(std::sync::Arc<[bool]>),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -72,12 +72,13 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
         let switches = system.dynamics.switch_count();
         let has_clocks = !system.dynamics.clock_periods().is_empty();
         let events = (switches > 0 || has_clocks).then(|| Events::new(switches, z.len()));
+        let kinks = if p > 0 { system.dynamics.kink_count() } else { 0 };
         let automatic = method == Method::Explicit && options.method == MethodChoice::Automatic;
         Self {
             recorder: Recorder::new(n, p, times, options.record_plan),
             limits: Limits::new(options),
             method,
-            runge_kutta: RungeKutta::new(pair, z.len(), norm(&system)),
+            runge_kutta: RungeKutta::new(pair, z.len(), (kinks, n), norm(&system)),
             bdf: Bdf::new(&system, norm(&system)),
             monitor: (automatic && options.follow_plan.is_none()).then(Monitor::default),
             system,
@@ -185,11 +186,11 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
                     if pair != self.runge_kutta.pair {
                         self.change_pair(pair, end)?;
                     }
-                    self.runge_kutta.follow(&mut self.system, step.end)?;
+                    self.runge_kutta.follow(&mut self.system, step)?;
                 }
                 Method::Bdf => self.bdf.follow(&mut self.system, step.end, step.order as usize)?,
             }
-            self.recorder.note(*step);
+            self.recorder.note(step.clone());
             self.take_step();
             next += 1;
         }
@@ -220,6 +221,11 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
             events.begin(&mut self.system, self.time, &self.z, &self.z_prime[..n]);
         }
         self.start_method(end)
+    }
+
+    /// Lets the values of kink functions decide on their sides again.
+    pub fn release_kinks(&mut self) {
+        self.runge_kutta.release_kinks(&mut self.system);
     }
 
     fn end_segment(&mut self) {
@@ -284,6 +290,7 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
             Method::Explicit => self.runge_kutta.interpolate(event.time, &mut self.z),
             Method::Bdf => self.bdf.interpolate(event.time, &mut self.z),
         }
+        self.release_kinks();
         let time_step = time_step(event.time, end);
         if let Some(events) = &mut self.events {
             events.cross(&mut self.system, event, time_step, &mut self.z)?;
@@ -345,6 +352,7 @@ impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
     /// Continues with another method from the end of the last step.
     fn change_method(&mut self, method: Method, end: f64) -> Result<(), Refusal> {
         self.keep_solution();
+        self.release_kinks();
         self.method = method;
         self.system.work.method = method.name(self.runge_kutta.pair);
         if self.time >= end {

@@ -1,11 +1,13 @@
 //! Explicit Runge-Kutta methods of order 5 and 8 with error control, interpolation and exact derivatives of their stages.
 
 use super::augmented::Augmented;
+use super::kinks::{Kink, Kinks};
 use super::norm::{ErrorNorm, Size};
-use super::problem::{Dynamics, FailureCause, PlannedStep};
+use super::problem::{Branches, Dynamics, FailureCause, PlannedStep};
 use super::stepper::{Limits, Refusal, first_not_finite};
 use super::{dormand_prince, tsitouras};
 use crate::linear::combine;
+use std::sync::Arc;
 
 /// Controller of step sizes with memory of the last error (Hairer-Norsett-Wanner-1993, IV.2 of Hairer-Wanner-1996).
 const SAFETY: f64 = 0.9;
@@ -27,6 +29,37 @@ const CAUTION: f64 = 10.0;
 /// solution it rejects a few. Chosen by trial on smooth and on kinked problems, which lie far on either side.
 const WATCHED_ATTEMPTS: u32 = 200;
 const REJECTED_AT_KINKS: u32 = 60;
+
+/// A kink whose effect in a step is this small, measured as an error, may lie within it.
+const HARMLESS: f64 = 0.1;
+/// A kink at a smaller share of a step is the one at which it starts: the solution does not leave it.
+const SMALLEST_SHARE: f64 = 1e-6;
+/// Attempts to come closer to a kink.
+const MOST_CORRECTIONS: u32 = 3;
+/// Steps in which values decide on sides where the solution stays at a kink.
+const FREE_STEPS: u32 = 10;
+
+/// A kink at which the step is to end.
+struct Aim {
+    kink: Kink,
+    /// Length of the step that would have crossed it.
+    step: f64,
+    /// Error per time by which the end of the step misses the kink.
+    jump: f64,
+    /// Attempts still allowed to come closer.
+    corrections: u32,
+}
+
+/// Kinks in an attempt.
+enum Crossing {
+    None,
+    /// To the sides given, without effect on the error.
+    Harmless(Arc<[bool]>),
+    /// With the jump per time, as an error.
+    At(Kink, f64),
+    /// The sides change, but where they do cannot be told.
+    Unclear,
+}
 
 /// Which pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,10 +156,18 @@ pub(super) struct RungeKutta {
     rejections: u32,
     /// Cause and component of the last rejection.
     trouble: (FailureCause, Option<usize>),
+    kinks: Kinks,
+    /// In the last step or the attempted one.
+    branches: Branches,
+    /// The last step ended at a kink: the sides behind it.
+    beyond: Option<Arc<[bool]>>,
+    /// Steps to come in which values decide on sides.
+    free_steps: u32,
 }
 
 impl RungeKutta {
-    pub fn new(pair: Pair, length: usize, norm: ErrorNorm) -> Self {
+    /// For solutions of this `length` and so many kink functions of the first `n` components.
+    pub fn new(pair: Pair, length: usize, (kinks, n): (usize, usize), norm: ErrorNorm) -> Self {
         Self {
             pair,
             time: 0.0,
@@ -146,6 +187,10 @@ impl RungeKutta {
             attempts: 0,
             rejections: 0,
             trouble: (FailureCause::StepTooSmall, None),
+            kinks: Kinks::new(kinks, n),
+            branches: Branches::Free,
+            beyond: None,
+            free_steps: 0,
         }
     }
 
@@ -169,6 +214,9 @@ impl RungeKutta {
         self.time = t;
         self.last_error = 1e-4;
         self.current.copy_from_slice(z);
+        self.beyond = None;
+        self.free_steps = 0;
+        self.set_branches(system, Branches::Free);
         let last = self.last();
         system.rates(t, z, &mut self.stages[last]);
         if let Some(place) = first_not_finite(&self.stages[last]) {
@@ -210,33 +258,157 @@ impl RungeKutta {
         limits: &Limits,
         end: f64,
     ) -> Result<PlannedStep, Refusal> {
-        // The last stage of a step is the first of the next one.
-        self.begin();
+        let branches = self.next_branches(system);
+        self.begin(system, branches);
         let mut rejected = false;
+        let mut aim: Option<Aim> = None;
         loop {
             let (step, reaches_end) = limits.fit(self.next_step, self.time, end);
             limits.check(system, self.time, step, end, self.trouble)?;
             self.attempt(system, step);
             self.attempts += 1;
             let error = self.measure(step);
-            if error.norm <= 1.0 {
-                let growth = self.growth(error.norm, if rejected { 1.0 } else { LARGEST_FACTOR });
-                // A step cut short by a forced end says nothing against the step planned before.
-                self.next_step = if reaches_end { (step * growth).max(self.next_step) } else { step * growth };
-                system.blame(error.component, self.time);
-                self.accept(system, step, if reaches_end { end } else { self.time + step });
-                return Ok(PlannedStep { end: self.time, order: self.pair.order() });
+            if error.norm > 1.0 || error.norm.is_nan() {
+                aim = None;
+                rejected = true;
+                self.reject(system);
+                self.next_step = step * self.shrink(error, system);
+                continue;
             }
-            rejected = true;
-            self.rejections += 1;
-            system.work.rejected_error += 1;
-            self.next_step = step * self.shrink(error, system);
+            match &mut aim {
+                Some(aim) => {
+                    if let Some(share) = self.correction(system, aim, step) {
+                        self.reject(system);
+                        self.next_step = share * step;
+                        continue;
+                    }
+                    self.next_step = aim.step;
+                    self.beyond = Some(aim.kink.beyond.clone());
+                }
+                None => match self.crossing(system, step) {
+                    Crossing::At(kink, jump) => {
+                        self.reject(system);
+                        self.next_step = kink.share * step;
+                        aim = Some(Aim { kink, step, jump, corrections: MOST_CORRECTIONS });
+                        continue;
+                    }
+                    Crossing::Unclear => {
+                        self.reject(system);
+                        self.free(system);
+                        self.next_step = 0.5 * step;
+                        continue;
+                    }
+                    Crossing::Harmless(beyond) => {
+                        self.plan_next(error, step, reaches_end, rejected);
+                        self.beyond = Some(beyond);
+                    }
+                    Crossing::None => self.plan_next(error, step, reaches_end, rejected),
+                },
+            }
+            system.blame(error.component, self.time);
+            self.accept(system, step, if reaches_end { end } else { self.time + step });
+            return Ok(PlannedStep { end: self.time, order: self.pair.order(), branches: self.branches.clone() });
         }
     }
 
+    /// Plans the step after an accepted one.
+    fn plan_next(&mut self, error: Size, step: f64, reaches_end: bool, rejected: bool) {
+        let growth = self.growth(error.norm, if rejected { 1.0 } else { LARGEST_FACTOR });
+        // A step cut short by a forced end says nothing against the step planned before.
+        self.next_step = if reaches_end { (step * growth).max(self.next_step) } else { step * growth };
+    }
+
+    fn reject<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) {
+        self.rejections += 1;
+        system.work.rejected_error += 1;
+    }
+
+    /// The branches of the next step: those of the last one unless it ended at a kink or kinks are left to the values.
+    fn next_branches<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) -> Branches {
+        self.free_steps = self.free_steps.saturating_sub(1);
+        if !self.kinks.exist() || self.free_steps > 0 {
+            return Branches::Free;
+        }
+        match (self.beyond.take(), &self.branches) {
+            (Some(beyond), _) => Branches::Held(beyond),
+            (None, Branches::Held(sides)) => Branches::Held(sides.clone()),
+            (None, _) => Branches::Held(self.kinks.sides(system, self.time, &self.current[..system.n])),
+        }
+    }
+
+    /// What kinks do in an attempt of length `h` whose error is small.
+    fn crossing<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) -> Crossing {
+        let Branches::Held(sides) = &self.branches else { return Crossing::None };
+        let sides = sides.clone();
+        let beyond = self.kinks.sides(system, self.time + h, &self.candidate[..system.n]);
+        if beyond == sides {
+            return Crossing::None;
+        }
+        let jump = self.jump(system, h, &sides);
+        if jump <= HARMLESS {
+            return Crossing::Harmless(beyond);
+        }
+        let mut kinks = std::mem::take(&mut self.kinks);
+        let found = kinks.find(system, (self.time, h), &sides, |share, y| self.interpolate_attempt(share, h, y));
+        self.kinks = kinks;
+        match found {
+            Some(kink) if kink.share >= SMALLEST_SHARE => Crossing::At(kink, jump / h),
+            _ => Crossing::Unclear,
+        }
+    }
+
+    /// By which factor an attempt of length `h` should be longer to end at the kink; none if it is close enough.
+    fn correction<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, aim: &mut Aim, h: f64) -> Option<f64> {
+        let mut kinks = std::mem::take(&mut self.kinks);
+        let interpolate = |share: f64, y: &mut [f64]| self.interpolate_attempt(share, h, y);
+        let share = kinks.near_end(system, (self.time, h), &aim.kink, interpolate);
+        self.kinks = kinks;
+        let is_close = (share - 1.0).abs() * h * aim.jump <= HARMLESS || aim.corrections == 0;
+        aim.corrections = aim.corrections.saturating_sub(1);
+        (!is_close).then_some(share)
+    }
+
+    /// Difference of the right-hand side on the sides held and on those by the values at the end of an attempt, as an error.
+    fn jump<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64, held: &Arc<[bool]>) -> f64 {
+        self.set_branches(system, Branches::Free);
+        system.rates(self.time + h, &self.candidate, &mut self.error);
+        self.set_branches(system, Branches::Held(held.clone()));
+        let last = &self.stages[self.last()];
+        self.error.iter_mut().zip(last).for_each(|(rate, held)| *rate = h * (*rate - held));
+        self.norm.of(&self.error).norm
+    }
+
+    /// Lets values decide on sides for some steps, beginning with the one that is attempted.
+    fn free<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) {
+        self.set_branches(system, Branches::Freed);
+        self.free_steps = FREE_STEPS;
+        system.rates(self.time, &self.current, &mut self.stages[0]);
+    }
+
+    /// Ends the hold of sides.
+    pub fn release_kinks<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) {
+        self.set_branches(system, Branches::Free);
+    }
+
+    fn set_branches<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, branches: Branches) {
+        match &branches {
+            Branches::Held(sides) => system.dynamics.hold_sides(Some(sides)),
+            Branches::Free | Branches::Freed if matches!(self.branches, Branches::Held(_)) => {
+                system.dynamics.hold_sides(None);
+            }
+            Branches::Free | Branches::Freed => {}
+        }
+        self.branches = branches;
+    }
+
     /// One step to exactly `end`, without error control.
-    pub fn follow<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, end: f64) -> Result<(), Refusal> {
-        self.begin();
+    pub fn follow<D: Dynamics + ?Sized>(
+        &mut self,
+        system: &mut Augmented<D>,
+        PlannedStep { end, branches, .. }: &PlannedStep,
+    ) -> Result<(), Refusal> {
+        let end = *end;
+        self.begin(system, branches.clone());
         let step = end - self.time;
         self.attempt(system, step);
         if let Some(place) = self.not_finite_place() {
@@ -260,11 +432,41 @@ impl RungeKutta {
         self.pair.stages() - 1
     }
 
-    /// The last stage of a step is the first of the next one.
-    fn begin(&mut self) {
+    /// The last stage of a step is the first of the next one, except where the sides of kinks change.
+    fn begin<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, branches: Branches) {
         let last = self.last();
         self.stages.swap(0, last);
         self.has_dense_stages = false;
+        let changes_sides = match (&self.branches, &branches) {
+            (Branches::Held(before), Branches::Held(now)) => before != now,
+            (_, branches) => *branches == Branches::Freed,
+        };
+        self.set_branches(system, branches);
+        if changes_sides {
+            system.rates(self.time, &self.current, &mut self.stages[0]);
+        }
+    }
+
+    /// The state within the attempted step, at a share of it.
+    fn interpolate_attempt(&self, share: f64, h: f64, y: &mut [f64]) {
+        match self.pair {
+            Pair::Five => {
+                let weights = tsitouras::interpolation(share);
+                let terms: [(usize, f64); tsitouras::STAGES] = std::array::from_fn(|stage| (stage, weights[stage]));
+                combine(y, &self.current[..y.len()], h, &terms, &self.stages);
+            }
+            // By Hermite's cubic: the method's own interpolant needs further stages.
+            Pair::Eight => {
+                let rest = 1.0 - share;
+                let (first, last) = (&self.stages[0], &self.stages[self.last()]);
+                for (i, value) in y.iter_mut().enumerate() {
+                    let (start, end) = (self.current[i], self.candidate[i]);
+                    let change = end - start;
+                    let bend = rest * (h * first[i] - change) + share * (change - h * last[i]);
+                    *value = start + share * (change + rest * bend);
+                }
+            }
+        }
     }
 
     /// All stages of a step; the new solution is left in `candidate`.

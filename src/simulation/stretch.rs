@@ -205,6 +205,18 @@ impl Dynamics for Seeded<'_> {
         self.bound.explicit_rates(t, y, rates)
     }
 
+    fn kink_count(&self) -> usize {
+        self.bound.kink_count()
+    }
+
+    fn kinks(&mut self, t: f64, y: &[f64], values: &mut [f64]) {
+        self.bound.kinks(t, y, values);
+    }
+
+    fn hold_sides(&mut self, sides: Option<&[bool]>) {
+        self.bound.hold_sides(sides);
+    }
+
     fn component_name(&self, i: usize) -> String {
         self.bound.component_name(i)
     }

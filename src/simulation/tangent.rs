@@ -163,6 +163,10 @@ impl Dynamics for Doubled<'_, '_> {
 
     fn parameter_derivative(&mut self, _t: f64, _y: &[f64], _y_prime: &[f64], _values: &mut [f64]) {}
 
+    fn hold_sides(&mut self, sides: Option<&[bool]>) {
+        self.bound.hold_sides(sides);
+    }
+
     fn explicit_rates(&mut self, t: f64, y: &[f64], rates: &mut [f64]) -> bool {
         let is_explicit = self.differential.iter().all(|differential| *differential);
         if is_explicit {

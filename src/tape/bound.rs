@@ -16,6 +16,8 @@ pub struct Bound<'a> {
     pub(super) registers: Vec<f64>,
     /// Whether the registers hold the rates at the time and variables that stand in them.
     is_current: bool,
+    /// Whether comparisons keep the values that stand in their registers.
+    pub(super) is_held: bool,
     parameter_scale: Vec<f64>,
     pub(super) scratch: Scratch,
     memory: Memory,
@@ -40,6 +42,7 @@ impl<'a> Bound<'a> {
             inputs: Sources { curves: &model.curves, inputs },
             registers: model.registers.clone(),
             is_current: false,
+            is_held: false,
             parameter_scale: Vec::new(),
             scratch: Scratch::default(),
             memory: Memory::default(),
@@ -87,17 +90,27 @@ impl<'a> Bound<'a> {
         let same_variables = variables.iter().zip(y).fold(0, |bits, (a, b)| bits | (a.to_bits() ^ b.to_bits())) == 0;
         if !(same_time && same_variables) {
             variables.copy_from_slice(y);
-            self.model.rates.execute(&mut self.registers, &self.inputs);
+            let rates = if self.is_held { &self.model.kinks.held_rates } else { &self.model.rates };
+            rates.execute(&mut self.registers, &self.inputs);
         }
         self.is_current = true;
     }
 
-    /// The outputs into their registers.
-    pub(super) fn update_outputs(&mut self, t: f64, y: &[f64]) {
+    /// Time and variables into their registers, before anything but the rates is computed.
+    pub(super) fn set_point(&mut self, t: f64, y: &[f64]) {
         let layout = self.model.layout;
         self.registers[layout.time] = t;
         self.registers[layout.variables..layout.variables + self.model.variables.len()].copy_from_slice(y);
+        self.forget_rates();
+    }
+
+    pub(super) fn forget_rates(&mut self) {
         self.is_current = false;
+    }
+
+    /// The outputs into their registers.
+    pub(super) fn update_outputs(&mut self, t: f64, y: &[f64]) {
+        self.set_point(t, y);
         self.model.outputs.execute(&mut self.registers, &self.inputs);
     }
 
@@ -171,7 +184,7 @@ impl<'a> Bound<'a> {
         start
     }
 
-    fn gather(&self, from: &[u32], out: &mut [f64]) {
+    pub(super) fn gather(&self, from: &[u32], out: &mut [f64]) {
         for (value, &register) in out.iter_mut().zip(from) {
             *value = self.registers[register as usize];
         }
@@ -267,6 +280,18 @@ impl Dynamics for Bound<'_> {
         self.update(t, y);
         self.gather(&self.model.rate_registers, rates);
         true
+    }
+
+    fn kink_count(&self) -> usize {
+        self.model.kinks.comparisons.len()
+    }
+
+    fn kinks(&mut self, t: f64, y: &[f64], values: &mut [f64]) {
+        self.evaluate_kinks(t, y, values);
+    }
+
+    fn hold_sides(&mut self, sides: Option<&[bool]>) {
+        self.hold_comparisons(sides);
     }
 
     fn switch_count(&self) -> usize {

@@ -2,6 +2,7 @@
 
 use super::events::{Change, Events, When};
 use super::expansion::Expansion;
+use super::kinks::{Kinks, comparisons};
 use super::model::{Derivative, DerivativeForm, Element, Layout, Model, Sources, StartProgram};
 use super::program::{Line, Program};
 use super::sweep::Sweep;
@@ -47,6 +48,7 @@ impl Model {
         let mut everything = [&roots.rates[..], &roots.outputs, &roots.probes, &output_derivatives].concat();
         everything.extend(nodes_of(&jacobian));
         everything.extend(&roots.events);
+        everything.extend(roots.comparisons.iter().map(|(_, difference)| difference));
         everything.extend(nodes_of(&event_derivative));
         everything.extend(nodes_of(&parameter_derivative));
         everything.extend(roots.starts.iter().flatten());
@@ -121,6 +123,7 @@ impl Model {
             assembler.derivative(program, &event_derivative)
         };
         let events = events(system, program, registers, derivative);
+        let kinks = assembler.kinks(&roots.comparisons, (&after_rates, &after_prologue), &rates);
 
         assembler.registers.clone_from(&after_rates);
         let probes = assembler.program(&roots.probes, Dependence::State);
@@ -155,6 +158,7 @@ impl Model {
             forcing,
             rates,
             rate_registers,
+            kinks,
             jacobian,
             jacobian_sources,
             pattern,
@@ -184,6 +188,8 @@ struct Roots {
     probes: Vec<Node>,
     /// Conditions and new values, event by event.
     events: Vec<Node>,
+    /// Of the rates, each with the difference of its sides.
+    comparisons: Vec<(Node, Node)>,
     /// Per experiment: the given start values, in state order.
     starts: Vec<Vec<Node>>,
 }
@@ -210,7 +216,8 @@ impl Roots {
         let mut next = || groups.next().unwrap_or_default();
         let (rates, outputs, probes, events) = (next(), next(), next(), next());
         let starts = groups.collect();
-        Self { graph, rates, outputs, probes, events, starts }
+        let comparisons = comparisons(&mut graph, &rates);
+        Self { graph, rates, outputs, probes, events, comparisons, starts }
     }
 }
 
@@ -429,6 +436,22 @@ impl<'a> Assembler<'a> {
             })
             .collect();
         Derivative { program, sweep: None, elements }
+    }
+
+    /// Comparisons that depend on variables; registers of the nodes after the rates and after the prologue.
+    fn kinks(
+        &mut self,
+        comparisons: &[(Node, Node)],
+        (after_rates, after_prologue): (&[u32], &[u32]),
+        rates: &Program,
+    ) -> Kinks {
+        let of_variables = |(node, _): &&(Node, Node)| self.dependence[node.index()] == Dependence::State;
+        let (nodes, differences): (Vec<Node>, Vec<Node>) = comparisons.iter().filter(of_variables).copied().unzip();
+        self.registers.copy_from_slice(after_prologue);
+        let program = self.program(&differences, Dependence::State);
+        let comparisons: Vec<u32> = nodes.iter().map(|node| after_rates[node.index()]).collect();
+        let held_rates = if comparisons.is_empty() { Program::default() } else { rates.without(&comparisons) };
+        Kinks { program, differences: self.registers_of(&differences), held_rates, comparisons }
     }
 
     /// d(`rows`)/d(`columns`) through programs already assembled.

@@ -17,6 +17,7 @@ mod emit;
 mod events;
 mod expansion;
 mod kernels;
+mod kinks;
 mod machine;
 mod model;
 mod program;

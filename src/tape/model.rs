@@ -3,6 +3,7 @@
 use super::InputSource;
 use super::events::Events;
 use super::expansion::Expansion;
+use super::kinks::Kinks;
 use super::program::Program;
 use super::sweep::{Scratch, Sweep};
 use crate::linear::SparsityPattern;
@@ -35,6 +36,7 @@ pub struct Model {
     pub(super) rates: Program,
     /// Registers of rates, then constraints. Length n.
     pub(super) rate_registers: Vec<u32>,
+    pub(super) kinks: Kinks,
     pub(super) jacobian: Derivative,
     /// Per slot of `pattern`: where its value stands.
     pub(super) jacobian_sources: Sources,

@@ -4,6 +4,7 @@ use super::InputSource;
 use super::kernels;
 use super::machine::Machine;
 use crate::expression::{Binary, Unary};
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -157,6 +158,19 @@ impl Program {
 
     pub fn run_count(&self) -> usize {
         self.runs.len()
+    }
+
+    /// The program without the instructions that compute `registers`.
+    pub fn without(&self, registers: &[u32]) -> Self {
+        let registers: HashSet<u32> = registers.iter().copied().collect();
+        let mut rest = &self.lines[..];
+        let mut groups = Vec::with_capacity(self.runs.len());
+        for run in &self.runs {
+            let (lines, others) = rest.split_at(run.count as usize);
+            rest = others;
+            groups.push(lines.iter().filter(|line| !registers.contains(&line.target)).copied().collect());
+        }
+        Self::new(groups)
     }
 
     /// Executes the program.

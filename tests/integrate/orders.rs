@@ -3,14 +3,16 @@
 use crate::problems::*;
 use crate::scalar::Scalar;
 use crate::system::{Equations, System};
-use ident::integrate::{Dynamics, MethodChoice, Options, Plan, PlannedStep, Start, integrate};
+use ident::integrate::{Branches, Dynamics, MethodChoice, Options, Plan, PlannedStep, Start, integrate};
 use std::sync::Arc;
 
 /// Error of the oscillator at `times` with `count` equal explicit steps to t = 2.
 fn explicit_error(mark: u8, count: usize, times: &[f64]) -> f64 {
     let mut system = System::new(Oscillator, &[3.0, 0.1]);
     let start = system.start(&[1.0, 0.0]);
-    let steps = (1..=count).map(|i| PlannedStep { end: 2.0 * i as f64 / count as f64, order: mark }).collect();
+    let steps = (1..=count)
+        .map(|i| PlannedStep { end: 2.0 * i as f64 / count as f64, order: mark, branches: Branches::Free })
+        .collect();
     let options = Options { follow_plan: Some(Arc::new(Plan { steps })), ..Options::default() };
     let solution = integrate(&mut system, &start, times, &[], &options).unwrap();
     let exact = times.iter().map(|&t| Oscillator::exact(t, 3.0, 0.1));
