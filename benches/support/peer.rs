@@ -3,8 +3,21 @@
 use crate::support::{median, timed};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::Instant;
 
-const ROUNDS: usize = 5;
+/// Most pairs of runs, and the seconds after which no further one begins.
+const ROUNDS: usize = 11;
+const LONG: f64 = 60.0;
+
+/// Medians of runs taken in turn.
+pub struct Pairs {
+    /// Seconds of own runs.
+    pub own: f64,
+    /// Seconds of the peer's.
+    pub peer: f64,
+    /// Median of the pairs' ratios: what slows a machine down for a while slows both.
+    pub ratio: f64,
+}
 
 /// The process that runs peers on request (`benches/peer.py`).
 pub struct Peer {
@@ -39,10 +52,15 @@ impl Peer {
         answer.trim().parse().unwrap_or_else(|_| panic!("`{request}`: the peer says `{answer}`"))
     }
 
-    /// Medians of own runs and of the peer's, taken in turn.
-    pub fn beside<T>(&mut self, request: &str, mut own: impl FnMut() -> T) -> (f64, f64) {
-        let (own, peer) = (0..ROUNDS).map(|_| (timed(1, &mut own).0, self.seconds(request))).unzip();
-        (median(own), median(peer))
+    /// Own runs and the peer's in turn.
+    pub fn beside<T>(&mut self, request: &str, mut own: impl FnMut() -> T) -> Pairs {
+        own();
+        let (begin, mut pairs) = (Instant::now(), Vec::new());
+        while pairs.len() < ROUNDS && (pairs.is_empty() || begin.elapsed().as_secs_f64() < LONG) {
+            pairs.push((timed(1, &mut own).0, self.seconds(request)));
+        }
+        let of = |value: fn(&(f64, f64)) -> f64| median(pairs.iter().map(value).collect());
+        Pairs { own: of(|(own, _)| *own), peer: of(|(_, peer)| *peer), ratio: of(|(own, peer)| own / peer) }
     }
 }
 

@@ -70,19 +70,25 @@ impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
 
     /// `z' = (f, f_y S + f_theta)` of a system with explicit rates.
     pub fn rates(&mut self, t: f64, z: &[f64], rates: &mut [f64]) {
-        let t = t.min(self.last_time);
         let (y, s) = z.split_at(self.n);
         let (y_rates, s_rates) = rates.split_at_mut(self.n);
-        self.work.residuals += 1;
         if self.p == 0 {
-            self.dynamics.explicit_rates(t, y, y_rates);
+            self.rates_of_state(t, y, y_rates);
             return;
         }
+        let t = t.min(self.last_time);
+        self.work.residuals += 1;
         self.work.jacobians += 1;
         self.dynamics.linearised_rates(t, y, y_rates, &mut self.jacobian, &mut self.parameter);
         s_rates.fill(0.0);
         self.order.subtract_product(&self.jacobian, s, s_rates, self.p);
         self.subtract_parameter_entries(s_rates);
+    }
+
+    /// `y' = f` of a system with explicit rates.
+    pub fn rates_of_state(&mut self, t: f64, y: &[f64], rates: &mut [f64]) {
+        self.work.residuals += 1;
+        self.dynamics.explicit_rates(t.min(self.last_time), y, rates);
     }
 
     pub fn residual(&mut self, t: f64, y: &[f64], y_prime: &[f64], residual: &mut [f64]) {

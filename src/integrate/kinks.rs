@@ -14,6 +14,8 @@ const MAXIMUM_ITERATIONS: usize = 40;
 /// Zeros are located to this share of the step.
 const LOCATED: f64 = 1e-7;
 
+/// Crossings are expected in so many times the next step.
+const FAR: f64 = 1.3;
 /// Distance of differences, as a share of a step.
 const SHORT: f64 = 1e-3;
 
@@ -29,7 +31,13 @@ pub(super) struct Kink {
 
 #[derive(Default)]
 pub(super) struct Kinks {
+    /// Where they were evaluated last.
     values: Vec<f64>,
+    /// Values at the end of the last step, and their slopes over it: as far as known.
+    at_start: Option<Vec<f64>>,
+    slopes: Option<Vec<f64>>,
+    /// Kinks that did harm when they were crossed.
+    harmful: Vec<bool>,
     /// Values at the ends of the interval that holds the zero.
     at_left: Vec<f64>,
     at_right: Vec<f64>,
@@ -39,7 +47,15 @@ pub(super) struct Kinks {
 impl Kinks {
     pub fn new(count: usize, n: usize) -> Self {
         let values = vec![0.0; count];
-        Self { at_left: values.clone(), at_right: values.clone(), values, y: vec![0.0; n] }
+        Self {
+            at_start: None,
+            slopes: None,
+            harmful: vec![false; count],
+            at_left: values.clone(),
+            at_right: values.clone(),
+            values,
+            y: vec![0.0; n],
+        }
     }
 
     pub fn exist(&self) -> bool {
@@ -52,6 +68,42 @@ impl Kinks {
         self.values.iter().map(|value| *value < 0.0).collect()
     }
 
+    /// Takes the end of a step of length `h` as the start of the next one; `known`: the last evaluation was there.
+    pub fn advance(&mut self, h: f64, known: bool) {
+        if !known || !self.exist() {
+            self.forget();
+            return;
+        }
+        if let Some(at_start) = &mut self.at_start {
+            let slopes = self.slopes.get_or_insert_with(|| vec![0.0; self.values.len()]);
+            for ((slope, start), end) in slopes.iter_mut().zip(at_start.iter_mut()).zip(&self.values) {
+                *slope = (end - *start) / h;
+                *start = *end;
+            }
+        } else {
+            self.at_start = Some(self.values.clone());
+        }
+    }
+
+    /// Forgets the course of the values.
+    pub fn forget(&mut self) {
+        self.at_start = None;
+        self.slopes = None;
+    }
+
+    /// Whether a kink that did harm before will probably be crossed in the next step, of length `h`.
+    pub fn expects_crossing(&self, h: f64, sides: &[bool]) -> bool {
+        let (Some(at_start), Some(slopes)) = (&self.at_start, &self.slopes) else { return false };
+        let courses = at_start.iter().zip(slopes).zip(sides).zip(&self.harmful);
+        courses
+            .filter(|(_, harmful)| **harmful)
+            .any(|(((start, slope), side), _)| (start + FAR * h * slope < 0.0) != *side)
+    }
+
+    pub fn mark_harmful(&mut self, kink: &Kink) {
+        self.harmful[kink.index] = true;
+    }
+
     /// The first change of `sides` in a step of length `h` from `t`; `interpolate` gives the state at a share of the step.
     pub fn find<D: Dynamics + ?Sized>(
         &mut self,
@@ -60,7 +112,7 @@ impl Kinks {
         sides: &[bool],
         interpolate: impl Fn(f64, &mut [f64]),
     ) -> Option<Kink> {
-        let Self { values, at_left, at_right, y } = self;
+        let Self { values, at_left, at_right, y, .. } = self;
         let mut evaluate = |share: f64, values: &mut [f64]| {
             interpolate(share, y);
             system.dynamics.kinks(t + share * h, y, values);

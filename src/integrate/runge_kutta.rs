@@ -1,13 +1,16 @@
 //! Explicit Runge-Kutta methods of order 5 and 8 with error control, interpolation and exact derivatives of their stages.
 
 use super::augmented::Augmented;
-use super::kinks::{Kink, Kinks};
+use super::kinks::Kinks;
 use super::norm::{ErrorNorm, Size};
 use super::problem::{Branches, Dynamics, FailureCause, PlannedStep};
 use super::stepper::{Limits, Refusal, first_not_finite};
 use super::{dormand_prince, tsitouras};
 use crate::linear::combine;
+use crossing::{Aim, Crossing};
 use std::sync::Arc;
+
+mod crossing;
 
 /// Controller of step sizes with memory of the last error (Hairer-Norsett-Wanner-1993, IV.2 of Hairer-Wanner-1996).
 const SAFETY: f64 = 0.9;
@@ -29,37 +32,6 @@ const CAUTION: f64 = 10.0;
 /// solution it rejects a few. Chosen by trial on smooth and on kinked problems, which lie far on either side.
 const WATCHED_ATTEMPTS: u32 = 200;
 const REJECTED_AT_KINKS: u32 = 60;
-
-/// A kink whose effect in a step is this small, measured as an error, may lie within it.
-const HARMLESS: f64 = 0.1;
-/// A kink at a smaller share of a step is the one at which it starts: the solution does not leave it.
-const SMALLEST_SHARE: f64 = 1e-6;
-/// Attempts to come closer to a kink.
-const MOST_CORRECTIONS: u32 = 3;
-/// Steps in which values decide on sides where the solution stays at a kink.
-const FREE_STEPS: u32 = 10;
-
-/// A kink at which the step is to end.
-struct Aim {
-    kink: Kink,
-    /// Length of the step that would have crossed it.
-    step: f64,
-    /// Error per time by which the end of the step misses the kink.
-    jump: f64,
-    /// Attempts still allowed to come closer.
-    corrections: u32,
-}
-
-/// Kinks in an attempt.
-enum Crossing {
-    None,
-    /// To the sides given, without effect on the error.
-    Harmless(Arc<[bool]>),
-    /// With the jump per time, as an error.
-    At(Kink, f64),
-    /// The sides change, but where they do cannot be told.
-    Unclear,
-}
 
 /// Which pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -216,6 +188,7 @@ impl RungeKutta {
         self.current.copy_from_slice(z);
         self.beyond = None;
         self.free_steps = 0;
+        self.kinks.forget();
         self.set_branches(system, Branches::Free);
         let last = self.last();
         system.rates(t, z, &mut self.stages[last]);
@@ -265,20 +238,28 @@ impl RungeKutta {
         loop {
             let (step, reaches_end) = limits.fit(self.next_step, self.time, end);
             limits.check(system, self.time, step, end, self.trouble)?;
+            if aim.is_none()
+                && let Some(ahead) = self.look_ahead(system, step)
+            {
+                self.next_step = ahead.kink.share * step;
+                aim = Some(ahead);
+                continue;
+            }
             self.attempt(system, step);
             self.attempts += 1;
             let error = self.measure(step);
             if error.norm > 1.0 || error.norm.is_nan() {
                 aim = None;
                 rejected = true;
-                self.reject(system);
+                self.rejections += 1;
+                system.work.rejected_error += 1;
                 self.next_step = step * self.shrink(error, system);
                 continue;
             }
             match &mut aim {
                 Some(aim) => {
                     if let Some(share) = self.correction(system, aim, step) {
-                        self.reject(system);
+                        system.work.rejected_error += 1;
                         self.next_step = share * step;
                         continue;
                     }
@@ -287,13 +268,13 @@ impl RungeKutta {
                 }
                 None => match self.crossing(system, step) {
                     Crossing::At(kink, jump) => {
-                        self.reject(system);
+                        system.work.rejected_error += 1;
                         self.next_step = kink.share * step;
-                        aim = Some(Aim { kink, step, jump, corrections: MOST_CORRECTIONS });
+                        aim = Some(Aim { kink, step, jump, corrections: crossing::MOST_CORRECTIONS });
                         continue;
                     }
                     Crossing::Unclear => {
-                        self.reject(system);
+                        system.work.rejected_error += 1;
                         self.free(system);
                         self.next_step = 0.5 * step;
                         continue;
@@ -316,73 +297,6 @@ impl RungeKutta {
         let growth = self.growth(error.norm, if rejected { 1.0 } else { LARGEST_FACTOR });
         // A step cut short by a forced end says nothing against the step planned before.
         self.next_step = if reaches_end { (step * growth).max(self.next_step) } else { step * growth };
-    }
-
-    fn reject<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) {
-        self.rejections += 1;
-        system.work.rejected_error += 1;
-    }
-
-    /// The branches of the next step: those of the last one unless it ended at a kink or kinks are left to the values.
-    fn next_branches<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) -> Branches {
-        self.free_steps = self.free_steps.saturating_sub(1);
-        if !self.kinks.exist() || self.free_steps > 0 {
-            return Branches::Free;
-        }
-        match (self.beyond.take(), &self.branches) {
-            (Some(beyond), _) => Branches::Held(beyond),
-            (None, Branches::Held(sides)) => Branches::Held(sides.clone()),
-            (None, _) => Branches::Held(self.kinks.sides(system, self.time, &self.current[..system.n])),
-        }
-    }
-
-    /// What kinks do in an attempt of length `h` whose error is small.
-    fn crossing<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) -> Crossing {
-        let Branches::Held(sides) = &self.branches else { return Crossing::None };
-        let sides = sides.clone();
-        let beyond = self.kinks.sides(system, self.time + h, &self.candidate[..system.n]);
-        if beyond == sides {
-            return Crossing::None;
-        }
-        let jump = self.jump(system, h, &sides);
-        if jump <= HARMLESS {
-            return Crossing::Harmless(beyond);
-        }
-        let mut kinks = std::mem::take(&mut self.kinks);
-        let found = kinks.find(system, (self.time, h), &sides, |share, y| self.interpolate_attempt(share, h, y));
-        self.kinks = kinks;
-        match found {
-            Some(kink) if kink.share >= SMALLEST_SHARE => Crossing::At(kink, jump / h),
-            _ => Crossing::Unclear,
-        }
-    }
-
-    /// By which factor an attempt of length `h` should be longer to end at the kink; none if it is close enough.
-    fn correction<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, aim: &mut Aim, h: f64) -> Option<f64> {
-        let mut kinks = std::mem::take(&mut self.kinks);
-        let interpolate = |share: f64, y: &mut [f64]| self.interpolate_attempt(share, h, y);
-        let share = kinks.near_end(system, (self.time, h), &aim.kink, interpolate);
-        self.kinks = kinks;
-        let is_close = (share - 1.0).abs() * h * aim.jump <= HARMLESS || aim.corrections == 0;
-        aim.corrections = aim.corrections.saturating_sub(1);
-        (!is_close).then_some(share)
-    }
-
-    /// Difference of the right-hand side on the sides held and on those by the values at the end of an attempt, as an error.
-    fn jump<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64, held: &Arc<[bool]>) -> f64 {
-        self.set_branches(system, Branches::Free);
-        system.rates(self.time + h, &self.candidate, &mut self.error);
-        self.set_branches(system, Branches::Held(held.clone()));
-        let last = &self.stages[self.last()];
-        self.error.iter_mut().zip(last).for_each(|(rate, held)| *rate = h * (*rate - held));
-        self.norm.of(&self.error).norm
-    }
-
-    /// Lets values decide on sides for some steps, beginning with the one that is attempted.
-    fn free<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) {
-        self.set_branches(system, Branches::Freed);
-        self.free_steps = FREE_STEPS;
-        system.rates(self.time, &self.current, &mut self.stages[0]);
     }
 
     /// Ends the hold of sides.
@@ -447,28 +361,6 @@ impl RungeKutta {
         }
     }
 
-    /// The state within the attempted step, at a share of it.
-    fn interpolate_attempt(&self, share: f64, h: f64, y: &mut [f64]) {
-        match self.pair {
-            Pair::Five => {
-                let weights = tsitouras::interpolation(share);
-                let terms: [(usize, f64); tsitouras::STAGES] = std::array::from_fn(|stage| (stage, weights[stage]));
-                combine(y, &self.current[..y.len()], h, &terms, &self.stages);
-            }
-            // By Hermite's cubic: the method's own interpolant needs further stages.
-            Pair::Eight => {
-                let rest = 1.0 - share;
-                let (first, last) = (&self.stages[0], &self.stages[self.last()]);
-                for (i, value) in y.iter_mut().enumerate() {
-                    let (start, end) = (self.current[i], self.candidate[i]);
-                    let change = end - start;
-                    let bend = rest * (h * first[i] - change) + share * (change - h * last[i]);
-                    *value = start + share * (change + rest * bend);
-                }
-            }
-        }
-    }
-
     /// All stages of a step; the new solution is left in `candidate`.
     fn attempt<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) {
         let last = self.last();
@@ -528,6 +420,7 @@ impl RungeKutta {
         std::mem::swap(&mut self.current, &mut self.candidate);
         self.time = end;
         self.last_step = step;
+        self.kinks.advance(step, matches!(self.branches, Branches::Held(_)));
     }
 
     /// Estimate of h |lambda| for the largest eigenvalue of f_y, from the last two stages, both at the end of the step.
