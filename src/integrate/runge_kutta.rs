@@ -239,6 +239,7 @@ impl RungeKutta {
             let (step, reaches_end) = limits.fit(self.next_step, self.time, end);
             limits.check(system, self.time, step, end, self.trouble)?;
             if aim.is_none()
+                && !rejected
                 && let Some(ahead) = self.look_ahead(system, step)
             {
                 self.next_step = ahead.kink.share * step;

@@ -12,8 +12,8 @@ use std::sync::Arc;
 const HARMLESS: f64 = 0.1;
 /// A kink at a smaller share of a step is the one at which it starts: the solution does not leave it.
 const SMALLEST_SHARE: f64 = 1e-6;
-/// A kink is met that is missed by this share of the step.
-const REACHED: f64 = 1e-8;
+/// A kink that is missed by at most this share of the step is met, once the step is corrected by it.
+const REACHED: f64 = 1e-6;
 /// Attempts to come closer to a kink.
 pub(super) const MOST_CORRECTIONS: u32 = 3;
 /// Steps in which values decide on sides where the solution stays at a kink.
@@ -145,7 +145,7 @@ impl RungeKutta {
         self.attempt_state(system, h);
         let mut kinks = std::mem::take(&mut self.kinks);
         let found = kinks.find(system, (self.time, h), &sides, |share, y| self.interpolate_attempt(share, h, y));
-        let found = found.filter(|kink| kink.share >= SMALLEST_SHARE).map(|mut kink| {
+        let found = found.filter(|kink| kink.share >= SMALLEST_SHARE).and_then(|mut kink| {
             for _ in 0..MOST_CORRECTIONS {
                 let length = kink.share * h;
                 self.attempt_state(system, length);
@@ -153,10 +153,10 @@ impl RungeKutta {
                 let factor = kinks.near_end(system, (self.time, length), &kink, interpolate);
                 kink.share *= factor;
                 if (factor - 1.0).abs() <= REACHED {
-                    break;
+                    return (kink.share <= 1.0).then_some(Aim { kink, step: h, jump: 0.0, corrections: 0 });
                 }
             }
-            Aim { kink, step: h, jump: 0.0, corrections: 0 }
+            None
         });
         self.kinks = kinks;
         found
