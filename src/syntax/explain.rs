@@ -260,6 +260,10 @@ impl Context<'_> {
                 "there is no test for equality; compare with `<`, `<=`, `>` or `>=`".to_owned()
             }
             "=" if self.word(-1) == "=" => "a field is written `key = value`, with one `=`".to_owned(),
+            _ if rules.contains(&Rule::equals) && self.word(-1) == "for" => {
+                "`for` repeats whole declarations (bodies, joints, forces); entries of one are written one by one"
+                    .to_owned()
+            }
             ":" if rules.contains(&Rule::equals) => "write `=` instead of `:`".to_owned(),
             "=" if rules.contains(&Rule::colon) => "write `:` instead of `=`".to_owned(),
             ";" => "declarations and fields end with their line, or with a comma within braces".to_owned(),
