@@ -270,7 +270,9 @@ mod tests {
     /// row shares an unknown with them or is a component of its own, of which no row can be spared.
     #[test]
     fn a_row_that_vanishes_is_replaced() {
-        let jacobian = |values| Jacobian { rows: 3, values };
+        fn jacobian(values: &[f64]) -> Jacobian<'_> {
+            Jacobian { rows: 3, values }
+        }
         let sets = |shared: f64| {
             let [usual, special] = [1.0, 0.0].map(|first| [first, 1.0, shared, 0.0, 0.0, 3.0]);
             let found = groups(&[0, 2], &[jacobian(&usual), jacobian(&special)], &[jacobian(&special)]);

@@ -260,7 +260,7 @@ impl Context<'_> {
                 "there is no test for equality; compare with `<`, `<=`, `>` or `>=`".to_owned()
             }
             "=" if self.word(-1) == "=" => "a field is written `key = value`, with one `=`".to_owned(),
-            _ if rules.contains(&Rule::equals) && self.word(-1) == "for" => {
+            _ if self.word(-1) == "for" && self.word(1) == "in" => {
                 "`for` repeats whole declarations (bodies, joints, forces); entries of one are written one by one"
                     .to_owned()
             }
