@@ -114,6 +114,7 @@ mod soup {
             "input",
             "body",
             "joint",
+            "coupling",
             "force",
             "actuator",
             "signal",

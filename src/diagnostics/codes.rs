@@ -355,6 +355,14 @@ codes! {
      Positions follow from rates; ports and parameters are given from outside.\n\
      Declare a state and change that: `state z: coordinate from 0 m`, `when x < 0 m { z := x }`.\n"
 
+    COUPLING "E0263" "coupling of other things than positions"
+    "A coupling is an equation between positions that holds at all times: positions of joints and points, elongations, modes, numbers,\n\
+     parameters, inputs and the time. What follows from velocities, loads or states of laws is no part of it - slip, friction and\n\
+     elasticity are force elements - and without any position there is nothing to couple.\n\
+     \n\
+     \x20   coupling gears: motor.position = 4.5 * wheel.position\n\
+     \x20   coupling spindle: carriage.position = 5 mm / (2 * pi) * screw.position\n"
+
     // ---- E03xx: mechanics ----
 
     UNCONNECTED_BODY "E0301" "body is not connected to ground"

@@ -61,6 +61,20 @@ impl Wrench {
     }
 }
 
+/// Loads on the coordinates of the links, and wrenches on the links.
+#[derive(Clone, Debug)]
+pub(super) struct Loads {
+    pub coordinates: Vec<Node>,
+    pub wrenches: Vec<Wrench>,
+}
+
+impl Loads {
+    pub fn none(graph: &mut Graph, tree: &Tree) -> Self {
+        let coordinates = vec![graph.constant(0.0); tree.links.len()];
+        Self { coordinates, wrenches: tree.links.iter().map(|_| Wrench::zero(graph)).collect() }
+    }
+}
+
 impl Inertia {
     pub fn zero(graph: &mut Graph) -> Self {
         let zero = vector::zero_matrix(graph);
@@ -185,14 +199,13 @@ pub(super) struct Accelerated {
     pub around: [Vector; 2],
 }
 
-/// Accelerations of all coordinates under `loads` on the coordinates and `wrenches` on the links.
+/// Accelerations of all coordinates under loads.
 pub(super) fn articulated_bodies(
     graph: &mut Graph,
     tree: &Tree,
     frames: &[FrameMotion],
     inertias: &[Inertia],
-    loads: &[Node],
-    wrenches: &[Wrench],
+    Loads { coordinates: loads, wrenches }: &Loads,
     gravity: Vector,
 ) -> Vec<Accelerated> {
     let count = tree.links.len();

@@ -1,11 +1,12 @@
 //! Can the loops be closed, and which of their constraints say something new? Answered near every start of the study.
 
 use super::linkage::{Linkage, OtherPosition};
-use super::loops::{Direction, Row};
+use super::loops::{Direction, Owner, Row};
 use super::selection::{Group, Jacobian, groups};
 use super::topology::Tree;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::{Graph, Node, Symbol};
+use crate::quantities::Dimension;
 use crate::study::{JointKind, Start, Study};
 use std::collections::HashMap;
 
@@ -122,12 +123,14 @@ fn contradicted(study: &Study, row: &Row) -> Diagnostic {
     let driven: Vec<&crate::study::Joint> =
         study.joints.iter().filter(|joint| joint.axes.iter().any(|axis| axis.prescribed.is_some())).collect();
     let names: Vec<String> = driven.iter().map(|joint| format!("`{}`", joint.name)).collect();
-    let held = &study.joints[row.joint];
-    let message =
-        format!("the prescribed motions of {} tear the loop apart at joint `{}`", names.join(", "), held.name);
+    let (held, moved) = (row.owner.name(study), names.join(", "));
+    let message = match row.owner {
+        Owner::Joint(_) => format!("the prescribed motions of {moved} tear the loop apart at joint `{held}`"),
+        Owner::Coupling(_) => format!("the prescribed motions of {moved} do not fit coupling `{held}`"),
+    };
     let mut diagnostic = Diagnostic::error(Code::MOTIONS_CONTRADICT, message)
-        .label(held.span, format!("cannot keep on holding {}", row.holds));
-    for joint in driven.iter().filter(|joint| joint.name != held.name) {
+        .label(row.owner.span(study), format!("cannot keep on holding {}", row.holds));
+    for joint in driven.iter().filter(|joint| joint.name != held) {
         diagnostic = diagnostic.secondary(joint.span, "its motion is prescribed");
     }
     diagnostic.help(
@@ -154,13 +157,17 @@ fn other_position(study: &Study, other: &OtherPosition) -> Diagnostic {
         .help(format!("say it in the start: `start = rest {{ {path} = {chosen} }}`"))
 }
 
-/// Gram-Schmidt over the rows, shifts before turns: a mechanism loses turning constraints first.
+/// Gram-Schmidt over the rows, shifts before turns: a mechanism loses turning constraints first, after couplings.
 fn independent_rows(jacobian: &[f64], rows: &[Row]) -> Vec<usize> {
     let (m, n) = (rows.len(), jacobian.len() / rows.len().max(1));
     let row = |i: usize| -> Vec<f64> { (0..n).map(|j| jacobian[j * m + i]).collect() };
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let mut order: Vec<usize> = (0..m).collect();
-    order.sort_by_key(|&i| matches!(rows[i].direction, Direction::Turn(_)));
+    order.sort_by_key(|&i| match rows[i].direction {
+        Direction::Shift(_) | Direction::Distance => 0,
+        Direction::Turn(_) => 1,
+        Direction::Relation(_) => 2,
+    });
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut kept = Vec::new();
     let typical = (0..m).map(|i| norm(&row(i))).fold(0.0, f64::max);
@@ -186,31 +193,48 @@ fn independent_rows(jacobian: &[f64], rows: &[Row]) -> Vec<usize> {
 
 fn not_closed(study: &Study, rows: &[Row], residual: &[f64]) -> Diagnostic {
     let worst = (0..rows.len()).max_by(|&a, &b| residual[a].abs().total_cmp(&residual[b].abs())).unwrap_or(0);
-    let joint = &study.joints[rows[worst].joint];
+    let owner = rows[worst].owner;
     let gap = match rows[worst].direction {
         Direction::Turn(_) => format!("{:.3} deg are left ({})", residual[worst].to_degrees(), rows[worst].holds),
+        Direction::Relation(dimension) => format!("{} are left between its sides", amount(dimension, residual[worst])),
         _ => format!("{:.4} mm are left ({})", residual[worst] * 1e3, rows[worst].holds),
     };
-    Diagnostic::error(Code::CANNOT_ASSEMBLE, format!("the loop closed by joint `{}` cannot be assembled", joint.name))
-        .label(joint.span, gap)
-        .help(
-            "check lengths and points of the bodies in the loop; or start nearer: `start = rest { JOINT.position = .. }` \
+    if let Owner::Coupling(_) = owner {
+        let message =
+            format!("coupling `{}` cannot be kept: no position near the start satisfies it", owner.name(study));
+        return Diagnostic::error(Code::CANNOT_ASSEMBLE, message).label(owner.span(study), gap).help(
+            "all coordinates are zero in the reference configuration; add a number to one side, or say in the `start` \
+             where the coupled joints stand",
+        );
+    }
+    let message = format!("the loop closed by joint `{}` cannot be assembled", owner.name(study));
+    Diagnostic::error(Code::CANNOT_ASSEMBLE, message).label(owner.span(study), gap).help(
+        "check lengths and points of the bodies in the loop; or start nearer: `start = rest { JOINT.position = .. }` \
              in the first experiment says how the mechanism stands",
-        )
+    )
+}
+
+/// A length in mm, an angle in degrees, anything else in SI.
+fn amount(dimension: Dimension, value: f64) -> String {
+    match dimension {
+        Dimension::LENGTH => format!("{:.4} mm", value * 1e3),
+        Dimension::ONE => format!("{:.3} deg", value.to_degrees()),
+        _ => format!("{value:.4e} {dimension}"),
+    }
 }
 
 fn cannot_move(study: &Study, rows: &[Row]) -> Diagnostic {
-    let mut names: Vec<String> = rows.iter().map(|row| format!("`{}`", study.joints[row.joint].name)).collect();
+    let mut names: Vec<String> = rows.iter().map(|row| format!("`{}`", row.owner.name(study))).collect();
     names.dedup();
     let verb = if names.len() == 1 { "takes" } else { "take" };
     let message = format!("the mechanism cannot move: {} {verb} away all its freedom", names.join(", "));
     let mut diagnostic = Diagnostic::error(Code::CANNOT_MOVE, message);
     let mut seen = Vec::new();
     for row in rows {
-        if !seen.contains(&row.joint) {
-            seen.push(row.joint);
-            let joint = &study.joints[row.joint];
-            diagnostic = diagnostic.label(joint.span, "closes a loop");
+        if !seen.contains(&row.owner) {
+            seen.push(row.owner);
+            let what = if matches!(row.owner, Owner::Joint(_)) { "closes a loop" } else { "couples positions" };
+            diagnostic = diagnostic.label(row.owner.span(study), what);
         }
     }
     diagnostic.help("remove a joint, replace it by one with more freedom, or prescribe a motion")
@@ -219,14 +243,24 @@ fn cannot_move(study: &Study, rows: &[Row]) -> Diagnostic {
 /// One warning per joint with redundant constraints, with the joint that would do without them.
 fn redundancies(study: &Study, rows: &[Row], kept: &[usize]) -> Vec<Diagnostic> {
     let mut warnings = Vec::new();
-    let mut joints: Vec<usize> = rows.iter().map(|row| row.joint).collect();
-    joints.dedup();
-    for index in joints {
-        let own = || (0..rows.len()).filter(move |&i| rows[i].joint == index);
+    let mut owners: Vec<Owner> = rows.iter().map(|row| row.owner).collect();
+    owners.dedup();
+    for owner in owners {
+        let own = || (0..rows.len()).filter(move |&i| rows[i].owner == owner);
         let dropped: Vec<usize> = own().filter(|i| !kept.contains(i)).collect();
         if dropped.is_empty() {
             continue;
         }
+        let Owner::Joint(index) = owner else {
+            let name = owner.name(study);
+            let message = format!("coupling `{name}` says what joints and other couplings say already");
+            let warning = Diagnostic::warning(Code::REDUNDANT_CONSTRAINT, message)
+                .label(owner.span(study), "redundant")
+                .note("the motion is the same without; its own load is undetermined and shown as zero")
+                .help(format!("remove coupling `{name}`, or replace one of the others by elastic elements"));
+            warnings.push(warning);
+            continue;
+        };
         let joint = &study.joints[index];
         let held: Vec<&str> = dropped.iter().map(|&i| rows[i].holds.as_str()).collect();
         let message =

@@ -1,6 +1,6 @@
 //! The stage's one entry.
 
-use super::articulated::{self, Accelerated, Inertia, Wrench};
+use super::articulated::{self, Accelerated, Inertia, Loads};
 use super::assemble::{assemble, quaternion_rates};
 use super::closing::{closing_coordinate, closing_rotation};
 use super::elastic::refuse_large_modes;
@@ -35,10 +35,12 @@ pub fn derive(study: &Study) -> Result<System, Vec<Diagnostic>> {
     let tree = spanning_tree(study, &mut graph)?;
     let frames = kinematics::motion(&mut graph, &tree);
     let inertias = articulated::link_inertias(&mut graph, study, &tree);
-    let loops = Loops::close(&mut graph, study, &tree, &frames)?;
 
     let geometries = force_geometries(&mut graph, study, &tree, &frames)?;
     let mut meaning = kinematic_meaning(&mut graph, study, &tree, &frames, &inertias, &geometries);
+    let loops = Loops::close(&mut graph, study, &tree, &frames, &meaning)?;
+    let in_couplings = loops.coupling_loads(&mut graph, study);
+    meaning.extend(study.couplings.iter().map(|coupling| coupling.load).zip(in_couplings));
     let loads: Vec<Node> = study.forces.iter().map(|force| force.load).collect();
     let loads = graph.substitute(&loads, &meaning);
     refuse_accelerations(&graph, study, &tree, &loads, &meaning)?;
@@ -263,29 +265,27 @@ fn accelerate(
     (geometries, loads): (&[ForceGeometry], &[Node]),
     loops: &Loops,
 ) -> Vec<Accelerated> {
-    let zero = graph.constant(0.0);
-    let mut coordinate_loads = vec![zero; tree.links.len()];
-    let mut wrenches: Vec<Wrench> = tree.links.iter().map(|_| Wrench::zero(graph)).collect();
+    let mut acting = Loads::none(graph, tree);
     for (geometry, &load) in geometries.iter().zip(loads) {
         match &geometry.effect {
-            Effect::Coordinate(link) => coordinate_loads[*link] = graph.add(coordinate_loads[*link], load),
+            Effect::Coordinate(link) => acting.coordinates[*link] = graph.add(acting.coordinates[*link], load),
             Effect::Links(unit) => {
                 for &(link, wrench) in unit {
                     let wrench = wrench.scale(graph, load);
-                    wrenches[link] = wrenches[link].add(graph, wrench);
+                    acting.wrenches[link] = acting.wrenches[link].add(graph, wrench);
                 }
             }
         }
     }
     for modal in &tree.modal {
         for (link, load) in modal.loads(graph, study) {
-            coordinate_loads[link] = graph.add(coordinate_loads[link], load);
+            acting.coordinates[link] = graph.add(acting.coordinates[link], load);
         }
         let weight = modal.weight(graph, study, &frames[modal.seat()]);
-        wrenches[modal.seat()] = wrenches[modal.seat()].add(graph, weight);
+        acting.wrenches[modal.seat()] = acting.wrenches[modal.seat()].add(graph, weight);
     }
-    loops.load(graph, frames, &loops.multipliers, &mut wrenches);
-    articulated::articulated_bodies(graph, tree, frames, inertias, &coordinate_loads, &wrenches, study.gravity)
+    loops.load(graph, frames, &loops.multipliers, &mut acting);
+    articulated::articulated_bodies(graph, tree, frames, inertias, &acting, study.gravity)
 }
 
 /// Meaning of all accelerations.

@@ -34,8 +34,18 @@ pub fn emit_tree(study: &Study) -> Result<String, Vec<Diagnostic>> {
             [&joint.parent, &joint.child].map(|end| end.body.map_or("ground", |body| study.bodies[body].name.as_str()));
         let _ = writeln!(text, "loop closed by {}: {} {} -> {}", joint.name, kind_text(joint), ends[0], ends[1]);
     }
+    for coupling in &study.couplings {
+        let _ = writeln!(text, "coupled by {}", coupling.name);
+    }
     let closing = study.joints.iter().filter(|joint| joint.closes_loop).count();
-    let loops = if closing == 0 { String::new() } else { format!(" of the tree, {closing} closed loops") };
+    let mut held = Vec::new();
+    if closing > 0 {
+        held.push(format!("{closing} closed loops"));
+    }
+    if !study.couplings.is_empty() {
+        held.push(format!("{} couplings", study.couplings.len()));
+    }
+    let loops = if held.is_empty() { String::new() } else { format!(" of the tree, {}", held.join(", ")) };
     let _ = writeln!(
         text,
         "\n{} bodies, {} joints, {moving} degrees of freedom{loops}",
@@ -157,6 +167,9 @@ pub fn emit_model(study: &Study, system: &System) -> String {
                 let _ = writeln!(text, "  {} = {}", axis.name, printer.text(motion));
             }
         }
+    }
+    for coupling in &study.couplings {
+        let _ = writeln!(text, "coupling {}: 0 = {}", coupling.name, printer.text(coupling.difference));
     }
     for force in &study.forces {
         force_text(&mut text, study, &printer, force);

@@ -3,22 +3,68 @@
 //! A row is the dot product of two vectors that move with the bodies; its rate is a linear function of the velocities, and
 //! a multiplier acts on the bodies by exactly the transpose of that function.
 
-use super::articulated::Wrench;
+use super::articulated::{Loads, Wrench};
 use super::chain::{Chain, Ends, FreeShift, unit};
 use super::kinematics::{self, FrameMotion};
 use super::topology::{Seat, Tree};
-use crate::diagnostics::{Code, Diagnostic};
+use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::expression::vector::{self, Vector};
 use crate::expression::{Graph, Node, Symbol};
+use crate::quantities::Dimension;
 use crate::study::{Joint, JointKind, Study};
 
 /// One constraint `0 = g(q, t)`.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
-    pub joint: usize,
+    pub owner: Owner,
     /// What it holds, in words.
     pub holds: String,
     pub direction: Direction,
+    pub form: Form,
+}
+
+/// What a row belongs to: index of a joint or of a coupling of the study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Owner {
+    Joint(usize),
+    Coupling(usize),
+}
+
+impl Owner {
+    pub fn name(self, study: &Study) -> &str {
+        match self {
+            Owner::Joint(joint) => &study.joints[joint].name,
+            Owner::Coupling(coupling) => &study.couplings[coupling].name,
+        }
+    }
+
+    pub fn span(self, study: &Study) -> Span {
+        match self {
+            Owner::Joint(joint) => study.joints[joint].span,
+            Owner::Coupling(coupling) => study.couplings[coupling].span,
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(super) enum Form {
+    Ends(Box<Held>),
+    Relation(Relation),
+}
+
+/// A relation of coordinates.
+#[derive(Clone, Debug)]
+pub(super) struct Relation {
+    /// g and dg/dt.
+    pub position: Node,
+    pub velocity: Node,
+    /// Links with dg/dt per rate of their coordinate: what multiplier 1 does to each.
+    pub levers: Vec<(usize, Node)>,
+}
+
+/// Something held between the two ends of a joint.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
     ends: MovingEnds,
     geometry: Geometry,
 }
@@ -31,6 +77,8 @@ pub(super) enum Direction {
     /// About the axis that is perpendicular to the two directions compared.
     Turn([f64; 3]),
     Distance,
+    /// Of a coupling between quantities of this dimension.
+    Relation(Dimension),
 }
 
 /// Points of the two ends, which prescribed motions move in their links, and the points where reactions are stated.
@@ -74,11 +122,11 @@ enum Geometry {
 }
 
 /// The distance along a direction of the near link, in the form of a constraint.
-pub(super) fn along(graph: &mut Graph, ends: &Ends, direction: Vector) -> Row {
+pub(super) fn along(graph: &mut Graph, ends: &Ends, direction: Vector) -> Held {
     let zero = vector::zero(graph);
     let geometry = Geometry::Carried(Arrow { now: direction, rate: zero });
     let ends = MovingEnds { near: ends.near, far: ends.far, rates: [zero; 2], child: ends.far, is_swapped: false };
-    Row { joint: 0, holds: String::new(), direction: Direction::Distance, ends, geometry }
+    Held { ends, geometry }
 }
 
 /// Rows of all joints that close loops.
@@ -95,7 +143,8 @@ pub(super) fn rows(graph: &mut Graph, study: &Study, tree: &Tree) -> Result<Vec<
         };
         let ends = moving_ends(graph, study.time, &chain);
         let mut add = |(direction, geometry): (Direction, Geometry)| {
-            rows.push(Row { joint: index, holds: holds(direction), direction, ends, geometry });
+            let form = Form::Ends(Box::new(Held { ends, geometry }));
+            rows.push(Row { owner: Owner::Joint(index), holds: holds(direction), direction, form });
         };
         if let (JointKind::Distance, Some(length)) = (joint.kind, joint.length) {
             add((Direction::Distance, Geometry::Distance(length)));
@@ -116,11 +165,12 @@ fn moving_ends(graph: &mut Graph, time: Symbol, chain: &Chain) -> MovingEnds {
     MovingEnds { near, far, rates, child, is_swapped: chain.is_swapped }
 }
 
-fn holds(direction: Direction) -> String {
+pub(super) fn holds(direction: Direction) -> String {
     match direction {
         Direction::Shift(axis) => format!("shifting along {}", super::emit::axis_text(axis)),
         Direction::Turn(axis) => format!("turning about {}", super::emit::axis_text(without_sign(axis))),
         Direction::Distance => "the distance of its ends".to_owned(),
+        Direction::Relation(_) => "both sides equal".to_owned(),
     }
 }
 
@@ -232,6 +282,49 @@ struct Moving {
 }
 
 impl Row {
+    /// g.
+    pub fn position(&self, graph: &mut Graph, frames: &[FrameMotion]) -> Node {
+        match &self.form {
+            Form::Ends(held) => held.position(graph, frames),
+            Form::Relation(relation) => relation.position,
+        }
+    }
+
+    /// dg/dt.
+    pub fn velocity(&self, graph: &mut Graph, frames: &[FrameMotion]) -> Node {
+        match &self.form {
+            Form::Ends(held) => held.velocity(graph, frames),
+            Form::Relation(relation) => relation.velocity,
+        }
+    }
+
+    /// Adds what `multiplier` does: wrenches on links and loads on their coordinates.
+    pub fn act(&self, graph: &mut Graph, frames: &[FrameMotion], multiplier: Node, loads: &mut Loads) {
+        match &self.form {
+            Form::Ends(held) => {
+                for (link, wrench) in held.wrenches(graph, frames, multiplier) {
+                    loads.wrenches[link] = loads.wrenches[link].add(graph, wrench);
+                }
+            }
+            Form::Relation(relation) => {
+                for &(link, lever) in &relation.levers {
+                    let load = graph.multiply(multiplier, lever);
+                    loads.coordinates[link] = graph.add(loads.coordinates[link], load);
+                }
+            }
+        }
+    }
+
+    /// Force or moment on the child per multiplier 1, at its attachment, ground axes; of a coupling none.
+    pub fn reaction(&self, graph: &mut Graph, frames: &[FrameMotion], is_moment: bool) -> Vector {
+        match &self.form {
+            Form::Ends(held) => held.reaction(graph, frames, is_moment),
+            Form::Relation(_) => vector::zero(graph),
+        }
+    }
+}
+
+impl Held {
     fn moving(&self, graph: &mut Graph, frames: &[FrameMotion]) -> Moving {
         let ends = [self.ends.near, self.ends.far];
         let [p, c] = ends.map(|end| kinematics::point_position(graph, frames, end));
@@ -389,7 +482,7 @@ impl Row {
     }
 
     /// Force or moment on the child per multiplier 1, at its attachment, ground axes.
-    pub fn reaction(&self, graph: &mut Graph, frames: &[FrameMotion], is_moment: bool) -> Vector {
+    fn reaction(&self, graph: &mut Graph, frames: &[FrameMotion], is_moment: bool) -> Vector {
         let (force, [_, moment]) = self.load(graph, frames);
         let mut on_far = force;
         if is_moment {

@@ -1,9 +1,10 @@
 //! Multipliers of closed loops, on velocity and on position level (Gear-Gupta-Leimkuhler-1985).
 
-use super::articulated::Wrench;
+use super::articulated::Loads;
 use super::assembly::{Assembly, Constraints, assemble_loops};
+use super::couplings;
 use super::kinematics::{self, FrameMotion};
-use super::loops::{self, Direction, Row};
+use super::loops::{self, Direction, Owner, Row};
 use super::scale::typical_magnitude;
 use super::selection::{Choice, is_in_force};
 use super::system::{Variable, VariableKind};
@@ -43,8 +44,10 @@ impl Loops {
         study: &Study,
         tree: &Tree,
         frames: &[FrameMotion],
+        meaning: &HashMap<Symbol, Node>,
     ) -> Result<Self, Vec<Diagnostic>> {
-        let rows = loops::rows(graph, study, tree)?;
+        let mut rows = loops::rows(graph, study, tree)?;
+        rows.extend(couplings::rows(graph, study, tree, frames, meaning));
         let positions: Vec<Node> = rows.iter().map(|row| row.position(graph, frames)).collect();
         let velocities: Vec<Node> = rows.iter().map(|row| row.velocity(graph, frames)).collect();
         let upright = loops::upright(graph, study, tree, frames);
@@ -54,8 +57,8 @@ impl Loops {
         let taken = Taken::new(graph, study, tree, &assembly, (&rows, &velocities));
         let labels: Vec<usize> = taken.slots.iter().map(|slot| slot[0].0).collect();
         let mut symbols = |word: &str| -> Vec<Symbol> {
-            let row = |at: &usize| (&study.joints[rows[*at].joint].name, &rows[*at].holds);
-            labels.iter().map(row).map(|(joint, holds)| graph.symbol(&format!("{joint}.{word}: {holds}"))).collect()
+            let row = |at: &usize| (rows[*at].owner.name(study), &rows[*at].holds);
+            labels.iter().map(row).map(|(owner, holds)| graph.symbol(&format!("{owner}.{word}: {holds}"))).collect()
         };
         let [multipliers, projections] = ["reaction", "projection"].map(&mut symbols);
         let [positions, velocities] = [&positions, &velocities].map(|nodes| taken.constraints(graph, nodes));
@@ -92,23 +95,31 @@ impl Loops {
     }
 
     /// Adds what the multipliers do to the links.
-    pub fn load(&self, graph: &mut Graph, frames: &[FrameMotion], multipliers: &[Symbol], wrenches: &mut [Wrench]) {
+    pub fn load(&self, graph: &mut Graph, frames: &[FrameMotion], multipliers: &[Symbol], loads: &mut Loads) {
         for (row, multiplier) in self.acting(graph, multipliers) {
-            for (link, wrench) in row.wrenches(graph, frames, multiplier) {
-                wrenches[link] = wrenches[link].add(graph, wrench);
+            row.act(graph, frames, multiplier, loads);
+        }
+    }
+
+    /// Load of every coupling, per coupling of the study: zero where others say the same.
+    pub fn coupling_loads(&self, graph: &mut Graph, study: &Study) -> Vec<Node> {
+        let mut loads = vec![graph.constant(0.0); study.couplings.len()];
+        for (row, multiplier) in self.acting(graph, &self.multipliers) {
+            if let Owner::Coupling(index) = row.owner {
+                loads[index] = multiplier;
             }
         }
+        loads
     }
 
     /// G^T mu per link.
     pub fn projection(&self, graph: &mut Graph, tree: &Tree, frames: &[FrameMotion]) -> Vec<Node> {
-        let zero = graph.constant(0.0);
+        let mut loads = Loads::none(graph, tree);
         if self.rows.is_empty() {
-            return vec![zero; tree.links.len()];
+            return loads.coordinates;
         }
-        let mut wrenches: Vec<Wrench> = tree.links.iter().map(|_| Wrench::zero(graph)).collect();
-        self.load(graph, frames, &self.projections, &mut wrenches);
-        let mut result = vec![zero; tree.links.len()];
+        self.load(graph, frames, &self.projections, &mut loads);
+        let Loads { mut wrenches, coordinates: mut result } = loads;
         for (i, link) in tree.links.iter().enumerate().rev() {
             let axis = kinematics::motion_axis(graph, link.axis);
             let own = wrenches[i].on(graph, axis);
@@ -152,8 +163,8 @@ impl Taken {
             assembly.kept.iter().filter(|row| !in_group(row)).map(|&row| vec![(row, always)]).collect();
         let mut choices = Vec::new();
         for group in &assembly.groups {
-            let joint = &study.joints[rows[group.sets[0][0]].joint].name;
-            let symbol = graph.symbol(&format!("{joint}.constraints_in_force"));
+            let owner = rows[group.sets[0][0]].owner.name(study);
+            let symbol = graph.symbol(&format!("{owner}.constraints_in_force"));
             let in_force: Vec<Node> = (0..group.sets.len()).map(|number| is_in_force(graph, symbol, number)).collect();
             for (at, &row) in group.sets[0].iter().enumerate() {
                 if group.sets.iter().all(|set| set[at] == row) {
@@ -201,19 +212,21 @@ pub(super) fn algebraic_part(
         scale: typical_magnitude(dimension, VariableKind::Algebraic),
         reference: 0.0,
     };
-    let is_turn = |row: &Row| matches!(row.direction, Direction::Turn(_));
+    let dimensions = |row: &Row| match row.direction {
+        Direction::Turn(_) => [Dimension::TORQUE, Dimension::ONE / Dimension::TIME],
+        Direction::Relation(of) => [Dimension::TORQUE / of, of / Dimension::TIME],
+        Direction::Shift(_) | Direction::Distance => [Dimension::FORCE, Dimension::VELOCITY],
+    };
     let mut algebraic = Vec::new();
     let labels: Vec<&Row> = loops.labels.iter().map(|&row| &loops.rows[row]).collect();
     for (row, &symbol) in labels.iter().zip(&loops.multipliers) {
-        algebraic.push(variable(graph, symbol, if is_turn(row) { Dimension::TORQUE } else { Dimension::FORCE }));
+        algebraic.push(variable(graph, symbol, dimensions(row)[0]));
     }
     for (row, &symbol) in labels.iter().zip(&loops.projections) {
-        let dimension = if is_turn(row) { Dimension::ONE / Dimension::TIME } else { Dimension::VELOCITY };
-        algebraic.push(variable(graph, symbol, dimension));
+        algebraic.push(variable(graph, symbol, dimensions(row)[1]));
     }
     let level = |word: &str| -> Vec<String> {
-        let joints = labels.iter().map(|row| (&study.joints[row.joint].name, &row.holds));
-        joints.map(|(joint, holds)| format!("{word} of `{joint}` ({holds})")).collect()
+        labels.iter().map(|row| format!("{word} of `{}` ({})", row.owner.name(study), row.holds)).collect()
     };
     let mut names = [level("velocity constraint"), level("position constraint")].concat();
     let mut constraints = [&loops.velocities[..], &loops.positions].concat();

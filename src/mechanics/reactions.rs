@@ -1,8 +1,11 @@
 //! What joints transmit.
 
 use super::articulated::Accelerated;
+use super::closing::closing_coordinate;
+use super::couplings;
 use super::forces::{Effect, ForceGeometry};
 use super::kinematics::{self, FrameMotion};
+use super::loops::Owner;
 use super::multipliers::Loops;
 use super::topology::{Seat, Tree};
 use crate::expression::vector::{self, Vector};
@@ -25,7 +28,7 @@ pub(super) fn add_reactions(
     let mut unknowns = Vec::new();
     for reaction in &study.reactions {
         let vector = if study.joints[reaction.joint].closes_loop {
-            closing_reaction(graph, study, (tree, frames), reaction, (geometries, loads), loops)
+            closing_reaction(graph, study, (tree, frames), reaction, (geometries, loads), (loops, meaning))
         } else {
             carried_reaction(graph, study, tree, frames, accelerated, reaction)
         };
@@ -75,11 +78,11 @@ fn closing_reaction(
     (tree, frames): (&Tree, &[FrameMotion]),
     reaction: &ReactionQuantity,
     (geometries, loads): (&[ForceGeometry], &[Node]),
-    loops: &Loops,
+    (loops, meaning): (&Loops, &HashMap<Symbol, Node>),
 ) -> Vector {
     let mut sum = vector::zero(graph);
     let acting = loops.acting(graph, &loops.multipliers);
-    for (row, multiplier) in acting.into_iter().filter(|(row, _)| row.joint == reaction.joint) {
+    for (row, multiplier) in acting.into_iter().filter(|(row, _)| row.owner == Owner::Joint(reaction.joint)) {
         let unit = row.reaction(graph, frames, reaction.is_moment);
         let share = vector::scale(graph, multiplier, unit);
         sum = vector::add(graph, sum, share);
@@ -87,9 +90,19 @@ fn closing_reaction(
     // Elements on the joint's own axes belong to what it transmits.
     let places = [&study.joints[reaction.joint].parent, &study.joints[reaction.joint].child];
     let [parent, child] = places.map(|end| tree.place(graph, end));
-    for ((force, geometry), &load) in study.forces.iter().zip(geometries).zip(loads) {
-        let ForcePlace::Joint { joint, .. } = force.place else { continue };
-        let (Effect::Links(wrenches), true) = (&geometry.effect, joint == reaction.joint) else { continue };
+    let on_joint = study.forces.iter().zip(geometries).zip(loads).filter(|((force, _), _)| match force.place {
+        ForcePlace::Joint { joint, .. } => joint == reaction.joint,
+        ForcePlace::Between { .. } => false,
+    });
+    let mut acting: Vec<(ForceGeometry, Node)> =
+        on_joint.map(|((_, geometry), &load)| (geometry.clone(), load)).collect();
+    let in_couplings = loops.coupling_loads(graph, study);
+    for (at, load) in couplings::loads_on(graph, study, &study.joints[reaction.joint], &in_couplings, meaning) {
+        let geometry = closing_coordinate(graph, study, tree, frames, (reaction.joint, at));
+        acting.extend(geometry.map(|geometry| (geometry, load)));
+    }
+    for (geometry, load) in acting {
+        let Effect::Links(wrenches) = &geometry.effect else { continue };
         // On the child; where that is ground, the opposite of what acts on the parent.
         let (body, factor) = match child.link {
             Some(_) => (child.link, load),

@@ -24,6 +24,7 @@ impl<'a> Checker<'a> {
         self.read_bodies();
         self.place_elements();
         let gravity = self.finished_gravity();
+        self.read_couplings();
         let forces = self.finished_forces();
         let signals = self.finished_signals();
         let measures = self.finished_measures();
@@ -41,7 +42,9 @@ impl<'a> Checker<'a> {
         let places = self.finished_places(&forces, &measures);
         let effects = self.effect_catalogue();
         self.check_declarations();
+        let couplings: Vec<_> = std::mem::take(&mut self.couplings).into_iter().flatten().collect();
         let mut roots = self.roots(&gravity, &joints, &forces, &measures, &experiments);
+        roots.extend(couplings.iter().map(|coupling| coupling.difference));
         roots.extend(events.iter().flat_map(super::model::Event::nodes));
         let kept = self.check_influence(&roots);
         self.check_unused(&roots);
@@ -67,6 +70,7 @@ impl<'a> Checker<'a> {
             inputs: std::mem::take(&mut self.inputs),
             bodies: std::mem::take(&mut self.bodies),
             joints,
+            couplings,
             forces,
             signals,
             states: std::mem::take(&mut self.states),

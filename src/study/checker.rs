@@ -5,7 +5,7 @@ use super::elements::PlacedForce;
 use super::evaluate::Typed;
 use super::instance::Instance;
 use super::load::Loaded;
-use super::model::{Body, Constant, Input, Parameter, Point, PointQuantity, ReactionQuantity, State};
+use super::model::{Body, Constant, Coupling, Input, Parameter, Point, PointQuantity, ReactionQuantity, State};
 use super::tables::Table;
 use super::topology::Topology;
 use crate::diagnostics::{Code, Diagnostic, Span};
@@ -49,6 +49,7 @@ pub(super) enum Entity {
     Joint(usize),
     /// Joint and axis: a place for elements.
     JointAxis(usize, usize),
+    Coupling(usize),
     Force(usize),
     Signal(usize),
     Effect(usize),
@@ -129,6 +130,8 @@ pub(super) struct Checker<'a> {
     /// Orientations of joints found so far.
     pub orientations: HashMap<usize, Option<[[Node; 3]; 3]>>,
     pub reactions: Vec<ReactionQuantity>,
+    /// Per declared coupling; `None`: wrong, as reported.
+    pub couplings: Vec<Option<Coupling>>,
     pub instances: Vec<Instance<'a>>,
     pub placed_forces: Vec<Option<PlacedForce>>,
     pub force_instances: Vec<Option<usize>>,
@@ -175,6 +178,7 @@ impl<'a> Checker<'a> {
             axis_index: HashMap::new(),
             orientations: HashMap::new(),
             reactions: Vec::new(),
+            couplings: Vec::new(),
             instances: Vec::new(),
             placed_forces: Vec::new(),
             force_instances: Vec::new(),
@@ -373,6 +377,7 @@ impl<'a> Checker<'a> {
         names.extend(declared.inputs.iter().map(|item| item.name.text.as_str()));
         names.extend(declared.bodies.iter().map(|item| item.name.text.as_str()));
         names.extend(declared.joints.iter().map(|item| item.name.text.as_str()));
+        names.extend(declared.couplings.iter().map(|item| item.name.text.as_str()));
         names.extend(declared.forces.iter().map(|item| item.name.text.as_str()));
         names.extend(declared.signals.iter().map(|item| item.name.text.as_str()));
         names.extend(declared.effects.iter().map(|item| item.name.text.as_str()));
@@ -392,6 +397,7 @@ fn entities<'a>(declared: &Declarations<'a>) -> HashMap<&'a str, Entity> {
     declared.inputs.iter().enumerate().for_each(|(index, item)| add(item.name, Entity::Input(index)));
     declared.bodies.iter().enumerate().for_each(|(index, item)| add(item.name, Entity::Body(index)));
     declared.joints.iter().enumerate().for_each(|(index, item)| add(item.name, Entity::Joint(index)));
+    declared.couplings.iter().enumerate().for_each(|(index, item)| add(item.name, Entity::Coupling(index)));
     declared.forces.iter().enumerate().for_each(|(index, item)| add(item.name, Entity::Force(index)));
     declared.signals.iter().enumerate().for_each(|(index, item)| add(item.name, Entity::Signal(index)));
     declared.effects.iter().enumerate().for_each(|(index, item)| add(item.name, Entity::Effect(index)));

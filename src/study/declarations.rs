@@ -21,6 +21,7 @@ pub(super) struct Declarations<'a> {
     /// `body ground { point anchor = (..) }`: points fixed in space.
     pub ground: Option<Body<'a>>,
     pub joints: Vec<Joint<'a>>,
+    pub couplings: Vec<Coupling<'a>>,
     pub forces: Vec<Element<'a>>,
     pub signals: Vec<Signal<'a>>,
     pub effects: Vec<Element<'a>>,
@@ -71,6 +72,12 @@ pub(super) struct Joint<'a> {
     pub parent: &'a Name,
     pub child: &'a Name,
     pub fields: &'a [Field],
+}
+
+pub(super) struct Coupling<'a> {
+    pub name: &'a Name,
+    pub left: &'a Expression,
+    pub right: &'a Expression,
 }
 
 pub(super) struct Element<'a> {
@@ -240,6 +247,7 @@ fn sort<'a>(result: &mut Declarations<'a>, item: &'a Item, by_variant: bool, dia
         ItemKind::Joint { name, kind, axes, parent, child, fields } => {
             result.joints.push(Joint { name, kind, axes, parent, child, fields });
         }
+        ItemKind::Coupling { name, left, right } => result.couplings.push(Coupling { name, left, right }),
         ItemKind::Element { role, name, law, place, fields } => {
             let element = Element { role: *role, name, law, place, fields };
             match role {
@@ -327,11 +335,19 @@ fn check_duplicates(result: &Declarations<'_>, parts: &[Name], diagnostics: &mut
     let inputs = result.inputs.iter().map(|input| ("input", input.name));
     let bodies = result.bodies.iter().map(|body| ("body", body.name));
     let joints = result.joints.iter().map(|joint| ("joint", joint.name));
+    let couplings = result.couplings.iter().map(|coupling| ("coupling", coupling.name));
     let forces = result.forces.iter().map(|force| ("force", force.name));
     let signals = result.signals.iter().map(|signal| ("signal", signal.name));
     let effects = result.effects.iter().map(|effect| ("effect", effect.name));
     let measures = result.measures.iter().map(|measure| ("measure", measure.name));
-    let all = constants.chain(inputs).chain(bodies).chain(joints).chain(forces).chain(signals).chain(effects);
+    let all = constants
+        .chain(inputs)
+        .chain(bodies)
+        .chain(joints)
+        .chain(couplings)
+        .chain(forces)
+        .chain(signals)
+        .chain(effects);
     let parts = parts.iter().map(|name| ("part", name));
     for (sort, name) in all.chain(measures).chain(parts) {
         declare(&mut values, sort, name, diagnostics);

@@ -346,7 +346,7 @@ impl<'a> Checker<'a> {
             Entity::Input(input) => Site::Input(input),
             Entity::Measure(measure) => Site::Measure(measure),
             Entity::Signal(signal) => Site::Signal(signal),
-            Entity::Joint(_) | Entity::Constant(_) | Entity::Body(_) | Entity::Effect(_) => {
+            Entity::Joint(_) | Entity::Coupling(_) | Entity::Constant(_) | Entity::Body(_) | Entity::Effect(_) => {
                 let message = format!("an effect cannot act on `{}`", name.text);
                 let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
                     .label(name.span, "not a place for effects")
@@ -502,7 +502,9 @@ impl<'a> Checker<'a> {
             Entity::Input(_) => PlaceKind::Input,
             Entity::Measure(_) => PlaceKind::Measure,
             Entity::Signal(_) => PlaceKind::Signal,
-            Entity::Joint(_) | Entity::Constant(_) | Entity::Body(_) | Entity::Effect(_) => return None,
+            Entity::Joint(_) | Entity::Coupling(_) | Entity::Constant(_) | Entity::Body(_) | Entity::Effect(_) => {
+                return None;
+            }
         })
     }
 }

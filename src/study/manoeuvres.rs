@@ -138,11 +138,11 @@ impl<'a> Checker<'a> {
         let value = self.evaluate(expression, Scope::Study(Allowed::Motion))?;
         let value = self.expect(value, expression.span, dimension, (field.key.span, "the input has"), SCOPE)?;
         let symbols = self.graph.symbols_of(&[value.node]);
-        let samples = self
-            .graph
-            .reachable(&[value.node])
-            .into_iter()
-            .any(|node| matches!(self.graph.operation(node), Operation::Sample { input, .. } if self.graph.curve(input).is_none()));
+        let is_sampled = |node| match self.graph.operation(node) {
+            Operation::Sample { input, .. } => self.graph.curve(input).is_none(),
+            _ => false,
+        };
+        let samples = self.graph.reachable(&[value.node]).into_iter().any(is_sampled);
         let foreign = symbols.into_iter().find(|symbol| *symbol != self.time);
         let on = match foreign {
             Some(symbol) => self.graph.symbol_name(symbol).to_owned(),

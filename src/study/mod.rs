@@ -9,6 +9,7 @@ mod assemble;
 mod bodies;
 mod channels;
 mod checker;
+mod couplings;
 mod declarations;
 mod effects;
 mod elaborate;

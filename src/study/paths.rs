@@ -62,6 +62,11 @@ impl<'a> Checker<'a> {
             (Entity::Constant(_) | Entity::Input(_) | Entity::Measure(_), Some(rest)) => {
                 self.no_quantity(name, rest, &[])
             }
+            (Entity::Coupling(index), Some(quantity)) => self.coupling_quantity(index, quantity, name, allowed),
+            (Entity::Coupling(index), None) => {
+                let word = self.coupling_word(index)?;
+                self.not_a_value(name, "a coupling", word)
+            }
             (Entity::Joint(_) | Entity::JointAxis(..), _) => self.not_a_value(name, "a joint", "position"),
             (Entity::Force(_), None) => self.not_a_value(name, "a force element", "force"),
             (Entity::Effect(_), None) => self.not_a_value(name, "an effect", "force"),
@@ -87,7 +92,7 @@ impl<'a> Checker<'a> {
         self.fail(diagnostic, Scope::Study(Allowed::Number))
     }
 
-    fn check_varies(&mut self, name: &'a Name, allowed: Allowed) -> Option<()> {
+    pub fn check_varies(&mut self, name: &'a Name, allowed: Allowed) -> Option<()> {
         if allowed != Allowed::Constant {
             return Some(());
         }
@@ -332,7 +337,7 @@ impl<'a> Checker<'a> {
         self.fail(diagnostic, Scope::Study(Allowed::Motion))
     }
 
-    fn no_quantity(&mut self, name: &'a Name, quantity: &str, known: &[&str]) -> Option<Typed> {
+    pub fn no_quantity(&mut self, name: &'a Name, quantity: &str, known: &[&str]) -> Option<Typed> {
         let (owner, _) = self.split_path(&name.text);
         let mut diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("`{owner}` has no `{quantity}`"))
             .label(name.span, "not known");

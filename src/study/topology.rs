@@ -192,8 +192,8 @@ impl<'a> Checker<'a> {
         Some(End { body, point, span: name.span })
     }
 
-    /// Joints with prescribed motion come first, then those that have no form as constraints, then those that carry elements,
-    /// then free ones, then those with the least freedom, so that loops are closed where the fewest constraints arise; among
+    /// Joints with prescribed motion come first, then those that have no form as constraints, then those that carry elements or
+    /// are coupled to others, then free ones, then those with the least freedom, so that loops are closed where the fewest constraints arise; among
     /// equals the ones declared first.
     fn choose_tree(&mut self) {
         let ground = self.declared.bodies.len();
@@ -204,8 +204,11 @@ impl<'a> Checker<'a> {
                 _ => None,
             })
             .collect();
-        let carries_elements =
-            |read: &ReadJoint| read.freedom.axes.iter().any(|a| on_places.contains(&a.name.as_str()));
+        let coupled = super::couplings::mentioned(&self.declared.couplings);
+        let carries_elements = |read: &ReadJoint| {
+            let is_named = |name: &str| on_places.contains(&name) || coupled.contains(name);
+            read.freedom.axes.iter().any(|axis| is_named(&axis.name))
+        };
         let mut candidates: Vec<usize> = (0..self.topology.joints.len())
             .filter(|joint| self.topology.joint(*joint).is_some_and(|read| read.freedom.kind != JointKind::Distance))
             .collect();

@@ -78,6 +78,7 @@ fn is_keyword(rule: Rule) -> bool {
             | body_word
             | point_word
             | joint_word
+            | coupling_word
             | force_word
             | actuator_word
             | signal_word
@@ -204,6 +205,7 @@ impl<'a> Builder<'a> {
             Rule::input => self.input(parts),
             Rule::body => self.body(parts),
             Rule::joint => self.joint(parts),
+            Rule::coupling => self.coupling(parts),
             Rule::element => self.element(parts),
             Rule::signal_formula => {
                 let name = self.name(parts.next()?);
@@ -271,6 +273,12 @@ impl<'a> Builder<'a> {
         let parent = self.name(parts.next()?);
         let child = self.name(parts.next()?);
         Some(ItemKind::Joint { name, kind, axes, parent, child, fields: self.optional_fields(&mut parts) })
+    }
+
+    fn coupling(&mut self, mut parts: Parts<'_>) -> Built<ItemKind> {
+        let name = self.name(parts.next()?);
+        let left = self.expression(parts.next()?);
+        Some(ItemKind::Coupling { name, left, right: self.expression(parts.next()?) })
     }
 
     fn joint_axes(&mut self, pair: Pair<'_, Rule>) -> Built<Vec<JointAxis>> {

@@ -61,6 +61,9 @@ fn kind(kind: &ItemKind) -> String {
             let head = format!("joint {}: {}{axes} {} -> {}", name.text, kind.text, parent.text, child.text);
             with_fields(&head, fields)
         }
+        ItemKind::Coupling { name, left, right } => {
+            format!("coupling {}: {} = {}", name.text, print_expression(left), print_expression(right))
+        }
         ItemKind::Element { role, name, law, place, fields } => {
             let head = format!("{} {}: {}{}", role_word(*role), name.text, law.text, place_text(place));
             with_fields(&head, fields)

@@ -5,7 +5,7 @@ use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use std::ops::Range;
 
 /// First words of declarations.
-pub(super) const KEYWORDS: [&str; 25] = [
+pub(super) const KEYWORDS: [&str; 26] = [
     "study",
     "use",
     "gravity",
@@ -13,6 +13,7 @@ pub(super) const KEYWORDS: [&str; 25] = [
     "input",
     "body",
     "joint",
+    "coupling",
     "force",
     "actuator",
     "signal",

@@ -39,6 +39,8 @@ pub enum ItemKind {
     Body { name: Name, fields: Vec<Field>, points: Vec<Field> },
     /// `joint NAME: prismatic(z) PARENT -> CHILD { fields }`; attachments are bodies or points (`ground`, `arm.tip`).
     Joint { name: Name, kind: Name, axes: Vec<JointAxis>, parent: Name, child: Name, fields: Vec<Field> },
+    /// `coupling NAME: LEFT = RIGHT`: a relation of positions that always holds.
+    Coupling { name: Name, left: Expression, right: Expression },
     /// `force|actuator|signal NAME: LAW [on JOINT | A -> B [along z]] { fields }`
     /// and `effect NAME: EFFECT on PLACE { fields }`.
     Element { role: ElementRole, name: Name, law: Name, place: ElementPlace, fields: Vec<Field> },

@@ -38,6 +38,7 @@ impl Builder {
             inputs: vec![],
             bodies: vec![],
             joints: vec![],
+            couplings: vec![],
             forces: vec![],
             signals: vec![],
             states: vec![],

@@ -3,6 +3,7 @@
 mod build;
 mod cantilever;
 mod cases;
+mod couplings;
 mod derivatives;
 mod elastic;
 mod faults;

@@ -19,7 +19,7 @@ const fn completion(heading: &'static str, number: usize, text: &'static str) ->
     Completion { heading, number, text }
 }
 
-const COMPLETIONS: [Completion; 22] = [
+const COMPLETIONS: [Completion; 23] = [
     completion(
         "Numbers, units, expressions",
         1,
@@ -49,6 +49,21 @@ const COMPLETIONS: [Completion; 22] = [
          body carbody { mass = 1 t, inertia = 1 t*m^2, point eye = (1 m, 0 m, 1 m) }\n\
          body bogie { mass = 1 t, inertia = 1 t*m^2, point eye = (1 m, 0 m, 0.38 m) }\njoint bogie_float: free ground -> bogie\n\
          body wheelset { mass = 1 t, inertia = 1 t*m^2 }\nbody pendulum { mass = 1 kg, inertia = 1 kg*m^2 }\nbody crank { mass = 1 kg, inertia = 1 kg*m^2 }\n",
+    ),
+    completion(
+        "Couplings",
+        1,
+        "constant z_sun = 24\nconstant z_ring = 60\nconstant mu = 0.1\n\
+         for i in 1 .. 7 { body disc[i] { mass = 1 kg, inertia = 0.1 kg*m^2 } }\nfor i in 1 .. 6 { body block[i] { mass = 1 kg } }\n\
+         joint motor: revolute(z) ground -> disc[1]\njoint wheel: revolute(z) ground -> disc[2]\njoint pinion: revolute(z) ground -> disc[3]\n\
+         joint spindle: revolute(z) ground -> disc[4]\njoint sun: revolute(z) ground -> disc[5]\njoint ring: revolute(z) ground -> disc[6]\n\
+         joint carrier: revolute(z) ground -> disc[7]\njoint slide: prismatic(z) ground -> block[1]\n\
+         joint carriage: prismatic(z) ground -> block[2]\njoint hook: prismatic(z) ground -> block[3]\n\
+         joint left_end: prismatic(z) ground -> block[4]\njoint right_end: prismatic(z) ground -> block[5]\n\
+         joint follower: prismatic(z) ground -> block[6]\n\
+         body camdisc { mass = 1 kg, inertia = 0.1 kg*m^2 }\njoint camshaft: revolute(y) ground -> camdisc\n\
+         table cam_table(turned: angle) -> length { points = ((0 deg, 0 mm), (90, 4), (180, 9)), interpolation = cubic, extrapolation = linear }\n\
+         law tooth_friction(v: angular_velocity, transmitted: torque) -> torque { param share: ratio\n = -share * abs(transmitted) * tanh(v / (0.1 rad/s)) }\n",
     ),
     completion(
         "Forces, actuators, signals",

@@ -158,6 +158,8 @@ fn element() -> impl Strategy<Value = String> {
         (declared_name(), expression()).prop_map(|(name, value)| format!("constant {name} = {value}")),
         body,
         joint,
+        (declared_name(), expression(), expression())
+            .prop_map(|(name, left, right)| format!("coupling {name}: {left} = {right}")),
         (role, declared_name(), name(), place, optional(fields()))
             .prop_map(|(role, name, law, place, fields)| format!("{role} {name}: {law}{place} {fields}")),
         (declared_name(), expression()).prop_map(|(name, value)| format!("signal {name} = {value}")),

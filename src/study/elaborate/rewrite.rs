@@ -32,6 +32,11 @@ impl Elaborator<'_, '_> {
                 self.declared_name(name, scope);
                 self.expression(value, None, scope);
             }
+            ItemKind::Coupling { name, left, right } => {
+                self.declared_name(name, scope);
+                self.expression(left, None, scope);
+                self.expression(right, None, scope);
+            }
             ItemKind::Input { name, title, fields, .. } => {
                 self.named_fields(name, fields, scope);
                 self.title(title, scope);

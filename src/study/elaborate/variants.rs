@@ -102,6 +102,7 @@ pub(super) fn declared_name(kind: &ItemKind) -> Option<&Name> {
         | ItemKind::Input { name, .. }
         | ItemKind::Body { name, .. }
         | ItemKind::Joint { name, .. }
+        | ItemKind::Coupling { name, .. }
         | ItemKind::Element { name, .. }
         | ItemKind::Formula { name, .. }
         | ItemKind::Measure { name, .. }

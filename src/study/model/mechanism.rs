@@ -118,6 +118,19 @@ pub struct JointSymbols {
     pub inertia: Symbol,
 }
 
+/// A relation of positions that always holds: gears, racks, screws, belts, cams.
+#[derive(Clone, Debug)]
+pub struct Coupling {
+    pub name: String,
+    /// Left side minus right side, in terms of positions of joint axes, modes and points, elongations, time, inputs, parameters.
+    pub difference: Node,
+    /// Of both sides.
+    pub dimension: Dimension,
+    /// What holds the relation: acts along the growing left side, against the growing right side.
+    pub load: Symbol,
+    pub span: Span,
+}
+
 /// What the study calls the joint; its freedom is in [`Joint::axes`] and [`Joint::rotation`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {

@@ -32,6 +32,7 @@ pub struct Study {
     pub inputs: Vec<Input>,
     pub bodies: Vec<Body>,
     pub joints: Vec<Joint>,
+    pub couplings: Vec<Coupling>,
     pub forces: Vec<Force>,
     /// Signals (controllers, filters, formulas): named values without a mechanical place.
     pub signals: Vec<Signal>,
