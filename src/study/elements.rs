@@ -216,6 +216,10 @@ impl<'a> Checker<'a> {
         if matches!(entity, Some(Entity::Body(_))) {
             diagnostic = diagnostic.help("between bodies write `A -> B`");
         }
+        if matches!(entity, Some(Entity::Coupling(_))) {
+            diagnostic =
+                diagnostic.help("let it act on one of the coupled joints; a coupling itself does not give way");
+        }
         if entity.is_none() { self.fail_unknown(&name.text, diagnostic, SCOPE) } else { self.fail(diagnostic, SCOPE) }
     }
 
