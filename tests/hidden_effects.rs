@@ -128,21 +128,22 @@ fn nothing_is_invented_where_nothing_is_hidden() {
     assert!(alarms.len() <= 1, "\n{}", alarms.join("\n"));
 }
 
-/// Records of the slider with a force over its position.
-fn pulled(force: fn(f64) -> f64, seed: u64) -> Prepared {
+/// What is found in records of the slider with a force over its position.
+fn pulled(force: fn(f64) -> f64, seed: u64) -> (Answer, Outcome) {
     let measured = |seed: u64, level: f64| Record::measure(&Pulled::by(force), &Effect::Nothing, seed, level);
     let (estimation, validation) = (measured(seed, 1.0), measured(seed + 1, 1.1));
     let case = nothing("spring_slide", seed);
-    Prepared { case, effect: Effect::Nothing, measured_strength: 0.0, estimation, validation }
+    let prepared = Prepared { case, effect: Effect::Nothing, measured_strength: 0.0, estimation, validation };
+    let answer = answer(&prepared);
+    let outcome = Outcome::judge(&prepared, &answer);
+    println!("{outcome}");
+    (answer, outcome)
 }
 
 /// A period along the path that lies between the values of any coarse grid.
 #[test]
 fn cogging_is_found_with_its_period() {
-    let prepared = pulled(cogging, 41);
-    let answer = answer(&prepared);
-    let outcome = Outcome::judge(&prepared, &answer);
-    println!("{outcome}");
+    let (answer, outcome) = pulled(cogging, 41);
     assert_eq!(outcome.accepted, ["ripple at guide"], "{outcome}");
     assert!(outcome.gain > 0.95 * outcome.true_gain, "{outcome}");
     let refit = answer.steps[0].ranking[0].refit.as_ref().expect("the accepted cause was refitted");
@@ -154,10 +155,7 @@ fn cogging_is_found_with_its_period() {
 /// exact, and the held-out record goes further out), and the shape shown is the magnet's, with a mean slope that the spring takes.
 #[test]
 fn a_force_without_a_law_is_shown_by_its_shape() {
-    let prepared = pulled(magnet, 39);
-    let answer = answer(&prepared);
-    let outcome = Outcome::judge(&prepared, &answer);
-    println!("{outcome}");
+    let (answer, outcome) = pulled(magnet, 39);
     assert_eq!(answer.verdict, Verdict::ShapeWithoutName, "{outcome}");
     assert_eq!(outcome.accepted, ["force_over_position at guide"], "{outcome}");
     assert!(outcome.gain > 0.8 * outcome.true_gain, "{outcome}");

@@ -8,7 +8,7 @@ use super::screen::Screened;
 use super::telling;
 use super::{Answer, Candidate as Reported, ChannelAnatomy, MissingForce, Step, Verdict};
 use crate::identify::Identification;
-use crate::quantities::Unit;
+use crate::quantities::{Unit, format_number};
 use crate::simulation::Compiled;
 use crate::study::ErrorDefinition;
 
@@ -70,6 +70,26 @@ impl Course {
         self.shapes.clear();
         self.ambiguous = false;
         self.limit_reached = false;
+    }
+
+    /// Takes back all that was accepted: beside what it leaves unexplained, its share of the held-out error, `gain`, is small.
+    pub(super) fn dismiss(&mut self, gain: f64) {
+        let mut names = Vec::new();
+        for step in &mut self.steps {
+            let Some(position) = step.accepted.take() else { continue };
+            names.push(step.ranking[position].name.clone());
+            step.judgement = format!("{}; dismissed in the end, since most stays unexplained", step.judgement);
+        }
+        self.remarks.push(format!(
+            "{} would explain {} % of the error and leave the rest, which is no noise: rather the shadow of another cause than the cause",
+            names.join(", then "),
+            format_number(100.0 * gain, 2)
+        ));
+        self.texts.clear();
+        self.telling.clear();
+        self.shapes.clear();
+        self.ambiguous = false;
+        self.unnamed = false;
     }
 
     /// Notes a round. `chosen` indexes `judged`.

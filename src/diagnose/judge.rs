@@ -42,6 +42,8 @@ pub(super) struct Judged {
     pub refitted: Refitted,
     pub bic: f64,
     pub report: Refit,
+    /// Relative change of the held-out error; `None` without held-out records.
+    pub held_out_change: Option<f64>,
     /// Largest change of a simulated channel, as a share of the channel's deviation.
     pub visible_change: f64,
 }
@@ -185,7 +187,7 @@ fn judge_one(
         objection,
     };
     let visible_change = visible_change(round, &refitted);
-    Judged { refitted, bic, report, visible_change }
+    Judged { refitted, bic, report, held_out_change: change.map(|change| change.estimate), visible_change }
 }
 
 /// How far the extension moves the simulated channels, relative to the channels' deviation.
@@ -251,7 +253,7 @@ fn objection(
     }
     match change {
         Some(change) if 100.0 * change.estimate > -MINIMUM_HELD_OUT_GAIN || !change.is_improvement() => {
-            Some("improves the fit, does not transfer to the held-out record".to_owned())
+            Some(super::TRANSFERS_NOT.to_owned())
         }
         None if has_held_out => Some("the held-out record cannot be simulated with it".to_owned()),
         _ => None,

@@ -29,6 +29,7 @@ use crate::diagnostics::Diagnostic;
 use crate::fit::Control;
 use crate::identify::{Fitted, Settings, fit, identification};
 use crate::simulation::{Compiled, Record, probe};
+use crate::statistics::ErrorChange;
 use crate::study::{self, Loaded};
 use course::Course;
 use judge::{HeldOut, Judged};
@@ -42,6 +43,10 @@ const SHORT_REFITS: usize = 16;
 const FULL_REFITS: usize = 8;
 const SHORT_ITERATIONS: usize = 3;
 const FULL_ITERATIONS: usize = 30;
+
+/// Share of the held-out error that causes must explain to be called that, where what they leave has a colour.
+const LEAST_EXPLAINED: f64 = 0.5;
+const TRANSFERS_NOT: &str = "improves the fit, does not transfer to the held-out record";
 
 /// What to diagnose and how far to go.
 #[derive(Clone, Debug)]
@@ -109,10 +114,17 @@ pub fn diagnose(
     if options.maximum_extensions > 0 {
         let start = named.first().unwrap_or(&model);
         if let Some(curve) = unnamed::unnamed(start, &model, &roles, &mut course, observer)? {
-            model = curve;
+            named.push(std::mem::replace(&mut model, curve));
         }
     }
     course.unexplained = unnamed::unexplained(&model);
+    if course.unexplained && !named.is_empty() && !course.limit_reached {
+        let gain = gain(&named[0], &model, &roles);
+        if gain < LEAST_EXPLAINED {
+            course.dismiss(gain);
+            model = named.swap_remove(0);
+        }
+    }
     if course.unexplained {
         course.sensors = sensors::remarks(&model.compiled, &model.fitted, &roles.estimation());
     }
@@ -141,6 +153,20 @@ fn first_model(
     Ok(Model { loaded: loaded.clone(), variant: variant.to_owned(), compiled, fitted, strengths: Vec::new() })
 }
 
+/// Share of the error that `extended` takes away from `model`: of the records that were not fitted, else of those that were.
+fn gain(model: &Model, extended: &Model, roles: &Roles) -> f64 {
+    let change = change(model, extended, roles).map(|change| change.estimate);
+    -change.unwrap_or_else(|| extended.fitted.discrepancy() / model.fitted.discrepancy() - 1.0)
+}
+
+/// What the fitted extension changes in the records that were not fitted, both under its own weights.
+fn change(model: &Model, extended: &Model, roles: &Roles) -> Option<ErrorChange> {
+    let (validation, weights) = (roles.validation(), &extended.fitted.weighting.weights);
+    let before = HeldOut::with_weights(&model.compiled, &model.fitted, weights, &validation)?;
+    let after = judge::held_out_residual(&extended.compiled, &extended.fitted, weights, &validation)?;
+    before.change(&after, judge::INTERVAL)
+}
+
 /// One round: screen, refit, judge. The extended model where an extension was accepted.
 fn extend(
     model: &Model,
@@ -159,23 +185,30 @@ fn extend(
     let refits = refit_best(&round, &candidates, &screened, observer);
     let validation = roles.validation();
     let held_out = HeldOut::new(&model.compiled, &model.fitted, &validation);
-    let judged = judge::judge(&round, &candidates, refits, held_out.as_ref());
+    let mut judged = judge::judge(&round, &candidates, refits, held_out.as_ref());
     course.simulations += judged.iter().map(|entry| entry.refitted.fitted.simulations).sum::<usize>();
     let mut chosen = judged.iter().position(Judged::accepted);
     if chosen.is_some_and(|position| judge::below_visibility(&round, &judged[position])) {
         course.below_visibility = course.accepted() == 0;
         chosen = None;
     }
+    let mut next = None;
+    if let Some(position) = chosen {
+        let refitted = &judged[position].refitted;
+        let adopted = adopt(model, &candidates[refitted.candidate], refitted, &records)?;
+        // With weights of its own the fit is another one.
+        if change(model, &adopted.0, roles).is_some_and(|change| change.estimate >= 0.0) {
+            judged[position].report.objection = Some(TRANSFERS_NOT.to_owned());
+            chosen = None;
+        } else {
+            next = Some(adopted);
+        }
+    }
     course.record(&round, &candidates, &screened, &judged, chosen);
-    let Some(chosen) = chosen else {
-        return Ok(None);
-    };
-    let entry = &judged[chosen];
-    let candidate = &candidates[entry.refitted.candidate];
-    observer(Event::Accepted { candidate: &candidate.name });
-    let next = adopt(model, candidate, &entry.refitted, &records)?;
-    course.texts.push(next.1);
-    Ok(Some(next.0))
+    let (Some((next, text)), Some(chosen)) = (next, chosen) else { return Ok(None) };
+    observer(Event::Accepted { candidate: &candidates[judged[chosen].refitted.candidate].name });
+    course.texts.push(text);
+    Ok(Some(next))
 }
 
 fn screen_all(

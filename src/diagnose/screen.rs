@@ -63,16 +63,22 @@ pub(super) fn screen(round: &Round, candidate: &Candidate) -> Option<Screened> {
 
 /// Relative difference below which two screens saw the same force.
 const EQUAL: f64 = 1e-6;
+/// Chi-square statistic above which two causes that score alike do so not by both doing nothing.
+const SHOWS: f64 = 1.0;
 
-/// One effect at elements that move alike (between the same bodies, or along the axis of their joint) is the very same force:
-/// the first one stands for all, the others become its aliases.
+/// One effect at elements that move alike (between the same bodies, or along the axis of their joint) is the very same force, and so
+/// are a constant load on a single slider and its tilted support: the first one stands for all, the others become its aliases.
 pub(super) fn merge_equal(candidates: &mut [Candidate], screened: &mut [Option<Screened>], current_deviance: f64) {
     for first in 0..candidates.len() {
         for other in first + 1..candidates.len() {
             let (Some(a), Some(b)) = (&screened[first], &screened[other]) else { continue };
-            let same_effect =
-                candidates[first].effect == candidates[other].effect && !candidates[first].change.is_empty();
-            if same_effect && a.equals(b, current_deviance) {
+            let are_effects = !candidates[first].change.is_empty() && !candidates[other].change.is_empty();
+            let is_same = if candidates[first].effect == candidates[other].effect {
+                a.equals(b, current_deviance)
+            } else {
+                a.changes_as(b)
+            };
+            if are_effects && is_same {
                 let mut names = std::mem::take(&mut candidates[other].aliases);
                 names.insert(0, candidates[other].name.clone());
                 candidates[first].aliases.extend(names);
@@ -83,6 +89,14 @@ pub(super) fn merge_equal(candidates: &mut [Candidate], screened: &mut [Option<S
 }
 
 impl Screened {
+    /// Other strengths, but the very same change of all channels, and one that shows.
+    fn changes_as(&self, other: &Self) -> bool {
+        let close = |a: f64, b: f64| (a - b).abs() <= EQUAL * a.abs().max(b.abs());
+        let scores =
+            matches!((self.score, other.score), (Some(a), Some(b)) if a.1 == b.1 && a.0 > SHOWS && close(a.0, b.0));
+        scores && close(self.deviance, other.deviance)
+    }
+
     /// The same strengths have the same effect. What changes nothing tells nothing about that.
     fn equals(&self, other: &Self, current_deviance: f64) -> bool {
         let close = |a: f64, b: f64| (a - b).abs() <= EQUAL * a.abs().max(b.abs());

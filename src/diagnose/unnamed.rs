@@ -24,6 +24,8 @@ const NOISE_SHARE: f64 = 0.9;
 const UNEXPLAINED: f64 = 0.3;
 /// Share of the held-out error of the named causes by which a curve must do better than they.
 const LEAST_GAIN: f64 = 0.5;
+/// Share of the held-out error that a curve must take: so many points follow the shadow of something else a little way.
+const LEAST_SHARE: f64 = 0.25;
 /// A search that was asked to end before so many causes may not have come to what it would name.
 const CHAIN: usize = 3;
 /// Curves refitted after the screen, and in how many iterations: beside a misfit that other parameters have bent to, the screen's linear
@@ -91,7 +93,8 @@ fn trial(
         let place = &candidates[judged[*position].refitted.candidate].place;
         let is_patchwork = course.crowded().as_ref() == Some(place);
         let wins = |rival: &Model| beats(&judged[*position], rival, &validation, is_patchwork);
-        !judge::below_visibility(&round, &judged[*position]) && rival.is_none_or(wins)
+        let shows = judged[*position].held_out_change.is_none_or(|change| change <= -LEAST_SHARE);
+        shows && !judge::below_visibility(&round, &judged[*position]) && rival.is_none_or(wins)
     });
     let Some(position) = chosen else {
         if rival.is_none() {
@@ -115,7 +118,11 @@ fn trial(
 /// Why no curve was taken, for readers who wonder about what is left.
 fn refused(best: &Judged, candidates: &[Candidate]) -> String {
     let name = &candidates[best.refitted.candidate].name;
-    let reason = best.report.objection.as_deref().unwrap_or("the named causes explain more of the held-out record");
+    let otherwise = match best.held_out_change {
+        Some(change) if change > -LEAST_SHARE => "it explains too little of the held-out record",
+        _ => "the named causes explain more of the held-out record",
+    };
+    let reason = best.report.objection.as_deref().unwrap_or(otherwise);
     format!("what is left is more than white noise; a free curve was tried, too (best: {name}): {reason}")
 }
 

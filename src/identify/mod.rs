@@ -19,6 +19,7 @@ mod report;
 mod result;
 mod saved;
 mod structures;
+mod suspicious;
 mod weights;
 mod whitening;
 

@@ -26,6 +26,7 @@ pub fn identification(compiled: &Compiled, fitted: &Fitted, records: &[&Record])
             Err(explanation) => remarks.push(format!("{} could not be simulated: {explanation}", record.name)),
         }
     }
+    remarks.extend(super::suspicious::remarks(&fits));
     remarks.extend(parameter_remarks(compiled, fitted, &confidence));
     remarks.extend(way_remarks(compiled, fitted, &confidence));
     let estimation: Vec<&Record> = records.iter().copied().filter(|r| r.role == Role::Estimation).collect();

@@ -54,12 +54,16 @@ pub(super) enum Entity {
     Signal(usize),
     Effect(usize),
     Measure(usize),
+    /// A component of gravity across its declared direction, by ground axis: a place for effects.
+    Gravity(usize),
 }
 
 /// Something with a value that effects can change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Site {
     Input(usize),
+    /// Component of gravity by ground axis.
+    Gravity(usize),
     Force(usize),
     Signal(usize),
     Measure(usize),
@@ -132,6 +136,8 @@ pub(super) struct Checker<'a> {
     pub reactions: Vec<ReactionQuantity>,
     /// Per declared coupling; `None`: wrong, as reported.
     pub couplings: Vec<Option<Coupling>>,
+    /// Components of gravity as declared; `None` without.
+    pub gravity: Option<[Typed; 3]>,
     pub instances: Vec<Instance<'a>>,
     pub placed_forces: Vec<Option<PlacedForce>>,
     pub force_instances: Vec<Option<usize>>,
@@ -179,6 +185,7 @@ impl<'a> Checker<'a> {
             orientations: HashMap::new(),
             reactions: Vec::new(),
             couplings: Vec::new(),
+            gravity: None,
             instances: Vec::new(),
             placed_forces: Vec::new(),
             force_instances: Vec::new(),
@@ -309,7 +316,7 @@ impl<'a> Checker<'a> {
                 let owner = self.site_name(site);
                 match site {
                     Site::Input(_) | Site::Measure(_) => owner.to_owned(),
-                    Site::Signal(_) if port == "value" => owner.to_owned(),
+                    Site::Signal(_) | Site::Gravity(_) if port == "value" => owner.to_owned(),
                     _ => format!("{owner}.{port}"),
                 }
             }
@@ -324,6 +331,7 @@ impl<'a> Checker<'a> {
             Site::Signal(index) => &declared.signals[index].name.text,
             Site::Measure(index) => &declared.measures[index].name.text,
             Site::JointEffect(index) => &declared.effects[index].name.text,
+            Site::Gravity(axis) => Self::gravity_name(axis),
             Site::Trial(index) => self.instances[index].owner,
         }
     }

@@ -12,13 +12,14 @@ use crate::syntax::{Declared, EffectAction, Name};
 
 const SCOPE: Scope = Scope::Study(Allowed::Number);
 
-const KINDS: [(&str, PlaceKind); 6] = [
+const KINDS: [(&str, PlaceKind); 7] = [
     ("joint", PlaceKind::Joint),
     ("force", PlaceKind::Force),
     ("actuator", PlaceKind::Actuator),
     ("input", PlaceKind::Input),
     ("measure", PlaceKind::Measure),
     ("signal", PlaceKind::Signal),
+    ("gravity", PlaceKind::Gravity),
 ];
 
 /// What may stand behind an amplitude or a shape.
@@ -263,5 +264,6 @@ fn has_port(kind: PlaceKind, port: &str) -> bool {
         PlaceKind::Input => matches!(port, "u" | "value"),
         PlaceKind::Measure => matches!(port, "y" | "value"),
         PlaceKind::Signal => !matches!(port, "u" | "y" | "x" | "v" | "load"),
+        PlaceKind::Gravity => port == "value",
     }
 }

@@ -169,7 +169,7 @@ impl<'a> Checker<'a> {
         if let Some(&(joint, axis)) = self.axis_index.get(name) {
             return Some(Entity::JointAxis(joint, axis));
         }
-        self.entities.get(name).copied()
+        self.gravity_component(name).or_else(|| self.entities.get(name).copied())
     }
 
     pub fn axis_entry(&self, joint: usize, axis: usize) -> Option<&AxisEntry> {
@@ -350,11 +350,12 @@ impl<'a> Checker<'a> {
             Entity::Input(input) => Site::Input(input),
             Entity::Measure(measure) => Site::Measure(measure),
             Entity::Signal(signal) => Site::Signal(signal),
+            Entity::Gravity(axis) => Site::Gravity(axis),
             Entity::Joint(_) | Entity::Coupling(_) | Entity::Constant(_) | Entity::Body(_) | Entity::Effect(_) => {
                 let message = format!("an effect cannot act on `{}`", name.text);
                 let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
                     .label(name.span, "not a place for effects")
-                    .help("effects act on moving joints, forces, actuators, inputs, measures and signals");
+                    .help("effects act on moving joints, forces, actuators, inputs, measures, signals and `gravity.x`");
                 return self.fail(diagnostic, SCOPE);
             }
         };
@@ -419,6 +420,7 @@ impl<'a> Checker<'a> {
                 None => return Some(Dimension::ONE),
             },
             Entity::Measure(index) => self.declared.measures[index].unit?,
+            Entity::Gravity(_) => return Some(Dimension::ACCELERATION),
             _ => return None,
         };
         Unit::parse(&unit.text).ok().map(|unit| unit.dimension)
@@ -506,6 +508,7 @@ impl<'a> Checker<'a> {
             Entity::Input(_) => PlaceKind::Input,
             Entity::Measure(_) => PlaceKind::Measure,
             Entity::Signal(_) => PlaceKind::Signal,
+            Entity::Gravity(_) => PlaceKind::Gravity,
             Entity::Joint(_) | Entity::Coupling(_) | Entity::Constant(_) | Entity::Body(_) | Entity::Effect(_) => {
                 return None;
             }

@@ -389,19 +389,4 @@ impl<'a> Checker<'a> {
         };
         solver
     }
-
-    /// Components in ground axes; zero where none is declared.
-    pub fn finished_gravity(&mut self) -> [Node; 3] {
-        let zero = self.graph.constant(0.0);
-        let Some((value, direction)) = self.declared.gravity else { return [zero; 3] };
-        let magnitude = self.field_value("gravity", value, Allowed::Constant);
-        let because = (value.span, "gravity has");
-        let magnitude =
-            magnitude.and_then(|typed| self.expect(typed, value.span, Dimension::ACCELERATION, because, SCOPE));
-        let (Some(magnitude), Some(direction)) = (magnitude, self.direction(direction)) else { return [zero; 3] };
-        direction.map(|component| {
-            let factor = self.graph.constant(component);
-            self.graph.multiply(factor, magnitude.node)
-        })
-    }
 }

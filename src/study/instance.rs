@@ -152,6 +152,7 @@ impl<'a> Checker<'a> {
                 let node = self.graph.variable(self.time);
                 Some(Typed::new(node, Dimension::TIME))
             }
+            "normal" if let Site::JointEffect(effect) = site => self.normal_force(effect, name),
             "pi" => Some(Typed::new(self.graph.constant(std::f64::consts::PI), Dimension::ONE)),
             _ => self.unknown_local(index, name),
         }
@@ -304,7 +305,7 @@ impl<'a> Checker<'a> {
             return;
         }
         let port = match site {
-            Site::Input(_) | Site::Measure(_) | Site::Signal(_) => super::ports::principal(site).0,
+            Site::Input(_) | Site::Measure(_) | Site::Signal(_) | Site::Gravity(_) => super::ports::principal(site).0,
             Site::Force(_) => "command",
             Site::JointEffect(_) | Site::Trial(_) => return,
         };

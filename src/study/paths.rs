@@ -70,6 +70,7 @@ impl<'a> Checker<'a> {
             (Entity::Joint(_) | Entity::JointAxis(..), _) => self.not_a_value(name, "a joint", "position"),
             (Entity::Force(_), None) => self.not_a_value(name, "a force element", "force"),
             (Entity::Effect(_), None) => self.not_a_value(name, "an effect", "force"),
+            (Entity::Gravity(axis), _) => self.site_value(Site::Gravity(axis), name.span),
             (Entity::Body(_), None) => self.not_a_value(name, "a body", "position.z"),
         }
     }

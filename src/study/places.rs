@@ -36,6 +36,7 @@ impl<'a> Checker<'a> {
                 value.map(|value| value_place(PlaceKind::Signal, &signal.name.text, value.dimension, value.node)),
             );
         }
+        places.extend(self.gravity_places());
         places
     }
 

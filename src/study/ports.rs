@@ -15,7 +15,7 @@ pub(super) fn principal(site: Site) -> (&'static str, &'static [&'static str]) {
     match site {
         Site::Input(_) => ("u", &["value"]),
         Site::Force(_) | Site::JointEffect(_) => ("load", &[]),
-        Site::Signal(_) => ("value", &[]),
+        Site::Signal(_) | Site::Gravity(_) => ("value", &[]),
         // An imagined place has ports only.
         Site::Trial(_) => ("", &[]),
         Site::Measure(_) => ("y", &["value"]),
@@ -30,7 +30,7 @@ impl<'a> Checker<'a> {
             Site::Signal(index) => self.signal_instances.get(index).copied().flatten(),
             Site::JointEffect(index) => self.effect_instances.get(index).copied().flatten(),
             Site::Trial(index) => Some(index),
-            Site::Input(_) | Site::Measure(_) => None,
+            Site::Input(_) | Site::Measure(_) | Site::Gravity(_) => None,
         }
     }
 
@@ -113,6 +113,7 @@ impl<'a> Checker<'a> {
                 Site::Force(index) => self.force_load(index),
                 Site::Signal(index) => self.signal_value(index),
                 Site::JointEffect(index) => self.joint_effect_load(index),
+                Site::Gravity(axis) => self.gravity_before_effects(axis),
                 Site::Trial(_) => None,
             };
         }

@@ -133,7 +133,7 @@ impl<'a> Checker<'a> {
         let (rate, load) = (rate_dimension(Motion::Translational), load_dimension(Motion::Translational));
         for place in &effect.places {
             let ports: &[(&'a str, Dimension)] = match place.text.as_str() {
-                "joint" => &[("x", length), ("v", rate), ("inertia", Dimension::MASS)],
+                "joint" => &[("x", length), ("v", rate), ("inertia", Dimension::MASS), ("normal", Dimension::FORCE)],
                 "force" => &[("x", length), ("v", rate), ("load", load)],
                 "actuator" => &[("x", length), ("v", rate), ("load", load), ("command", ANY_VALUE)],
                 "input" => &[("u", ANY_VALUE), ("value", ANY_VALUE)],

@@ -5,6 +5,7 @@ mod cantilever;
 mod cases;
 mod couplings;
 mod derivatives;
+mod effects;
 mod elastic;
 mod faults;
 mod impacts;

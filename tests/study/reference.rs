@@ -148,7 +148,7 @@ const COMPLETIONS: [Completion; 23] = [
     completion(
         "Effects",
         2,
-        "body block { mass = 2 kg }\njoint slide: prismatic(z) ground -> block\nidentify { F_slide in 0 .. 100 N from 20 N }\nmeasure z [mm] = slide.position\n",
+        "body block { mass = 2 kg }\njoint slide: prismatic(z) ground -> block\ngravity = 9.81 m/s^2 along -z\nidentify { F_slide in 0 .. 100 N from 20 N, a_tilt in -1 .. 1 m/s^2 from 0 m/s^2 }\nmeasure z [mm] = slide.position\n",
     ),
     completion(
         "Models, parts, families",

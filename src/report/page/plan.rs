@@ -167,13 +167,14 @@ fn excitation(excitation: &Excitation) -> ExcitationView {
     }
 }
 
-/// Bars: identifiability (its square root, so that weak parameters show), and the relative deviation.
+/// Bars: identifiability and relative deviation, both as square roots, so that small ones show. The second is full at 100 % of the value;
+/// what is undetermined has none.
 fn parameters(outcome: &Outcome) -> Vec<ParameterView> {
     let relative = |k: usize| {
         let parameter = &outcome.parameters[k];
-        parameter.standard_deviation.map(|deviation| deviation / parameter.value.abs())
+        let deviation = parameter.standard_deviation.filter(|_| parameter.value != 0.0)?;
+        Some(deviation / parameter.value.abs())
     };
-    let largest = (0..outcome.parameters.len()).filter_map(relative).fold(0.0, f64::max);
     outcome
         .parameters
         .iter()
@@ -189,7 +190,7 @@ fn parameters(outcome: &Outcome) -> Vec<ParameterView> {
             bars_svg: bars(
                 &[
                     Bar { value: parameter.identifiability.sqrt(), style: Style::After },
-                    Bar { value: relative(k).unwrap_or(largest) / largest, style: Style::Before },
+                    Bar { value: relative(k).map_or(0.0, f64::sqrt), style: Style::Before },
                 ],
                 1.0,
                 BAR_WIDTH,

@@ -25,6 +25,8 @@ pub enum PlaceKind {
     Input,
     Measure,
     Signal,
+    /// A component of gravity, by ground axis.
+    Gravity,
 }
 
 #[derive(Clone, Debug)]
