@@ -277,7 +277,9 @@ fn adopt(
     let loaded = model.loaded.with_text(&text);
     let compiled = Compiled::new(study::check(&loaded, Some(&name))?.study)?;
     let start = Some(refitted.fitted.theta.clone());
-    let settings = Settings { start, ..Settings::default() };
+    // Under the channels' magnitudes as weights the way from there may lead to another minimum.
+    let first_weights = Some(refitted.fitted.weighting.clone());
+    let settings = Settings { start, first_weights, ..Settings::default() };
     let fitted =
         fit(&compiled, records, &settings, &mut |_| Control::Continue).map_err(|diagnostic| vec![diagnostic])?;
     let mut strengths = model.strengths.clone();

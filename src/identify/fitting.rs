@@ -32,6 +32,9 @@ pub struct Settings {
     pub start: Option<Vec<f64>>,
     /// Weights per measure (1/SI); found by the fit where absent.
     pub weights: Option<Weighting>,
+    /// Weights to begin with where none are given, in place of the channels' magnitudes: a start that is good under these may be
+    /// left for another minimum under those.
+    pub first_weights: Option<Weighting>,
     pub maximum_iterations: Option<usize>,
     /// Further searches from points all over the bounds, the best of all counts; and their seed.
     pub further_starts: usize,
@@ -160,7 +163,10 @@ fn output(
     let filters = prefilters(compiled, records)?;
     let mut weighting = match &settings.weights {
         Some(weighting) => weighting.clone(),
-        None => first_weights(&compiled.study, records, &filters),
+        None => settings
+            .first_weights
+            .as_ref()
+            .map_or_else(|| first_weights(&compiled.study, records, &filters), Weighting::as_first),
     };
     let rounds = if settings.weights.is_some() { 0 } else { REWEIGHTINGS };
     let gains: Vec<f64> = filters.iter().map(Prefilter::noise_gain).collect();

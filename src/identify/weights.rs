@@ -20,6 +20,12 @@ const MAGNITUDE: &str = "magnitude of the channel";
 const RESIDUAL: &str = "residual of the fit";
 
 impl Weighting {
+    /// The same weights as a beginning: at least one fit follows with those of its own residual.
+    pub(super) fn as_first(&self) -> Self {
+        let begin = |source: &&'static str| if *source == RESIDUAL { MAGNITUDE } else { *source };
+        Self { weights: self.weights.clone(), sources: self.sources.iter().map(begin).collect() }
+    }
+
     /// Largest relative change of a weight against `other`, after taking out a common factor.
     pub fn largest_change(&self, other: &Weighting) -> f64 {
         let ratios: Vec<f64> = self

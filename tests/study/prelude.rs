@@ -8,6 +8,7 @@ use ident::syntax::{Declared, EffectDeclaration, ItemKind, LawDeclaration, Tree}
 
 /// A machine with one place of every kind, translational and rotational.
 const MACHINE: &str = "study machine
+gravity = 9.81 m/s^2 along -z
 input u [mm]
 input p [V]
 body cart { mass = 2 kg }
@@ -117,11 +118,12 @@ fn places(kind: &str) -> Vec<(&'static str, [&'static str; 3])> {
         "input" => vec![("u", ["m", "N", "m"]), ("p", TRANSLATION)],
         "measure" => vec![("position", ["m", "N", "m"]), ("angle", ["m", "N", "rad"])],
         "signal" => vec![("controller", TRANSLATION)],
+        "gravity" => vec![("gravity.x", ["m", "N", "m/s^2"]), ("gravity.y", ["m", "N", "m/s^2"])],
         other => panic!("no place of kind `{other}`"),
     }
 }
 
-const VALUES: [(&str, f64); 10] = [
+const VALUES: [(&str, f64); 16] = [
     ("t", 0.37),
     ("slide.position", 0.4),
     ("slide.velocity", -0.3),
@@ -131,6 +133,12 @@ const VALUES: [(&str, f64); 10] = [
     ("damper_1.rate", 0.9),
     ("slide.inertia", 2.0),
     ("hinge.inertia", 3.0),
+    ("slide.reaction.force.x", 0.6),
+    ("slide.reaction.force.y", -1.1),
+    ("slide.reaction.force.z", 2.3),
+    ("hinge.reaction.force.x", 1.7),
+    ("hinge.reaction.force.y", 0.4),
+    ("hinge.reaction.force.z", -0.9),
     ("e.none", 0.0),
 ];
 
@@ -144,6 +152,10 @@ fn affected(study: &Study, kind: &str, place: &str) -> Node {
         "force" | "actuator" => study.forces.iter().find(|force| force.name == place).expect("a force").load,
         "measure" => study.measures.iter().find(|measure| measure.name == place).expect("a measure").value,
         "signal" => study.signals.iter().find(|signal| signal.name == place).expect("a signal").value,
+        "gravity" => {
+            study.gravity
+                [["gravity.x", "gravity.y", "gravity.z"].iter().position(|axis| *axis == place).expect("an axis")]
+        }
         _ => study.places.iter().find(|other| other.name == place).expect("a place").probes[0].1,
     }
 }
