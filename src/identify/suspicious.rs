@@ -110,8 +110,9 @@ fn wild(channel: &ChannelFit, time: &[f64]) -> Option<String> {
     );
     let is_few = count as f64 <= (FEW * residual.len() as f64).max(1.0) && squares > MOST * total;
     is_few.then(|| {
-        let samples = if count == 1 { "1 sample stands".to_owned() } else { format!("{count} samples stand") };
-        format!("{samples} far off (the first: {at}) and make most of its error: correct them, or write `loss = huber` in the solver")
+        let (samples, make) =
+            if count == 1 { ("1 sample stands".to_owned(), "makes") } else { (format!("{count} samples stand"), "make") };
+        format!("{samples} far off (the first: {at}) and {make} most of its error: correct them, or write `loss = huber` in the solver")
     })
 }
 
