@@ -16,7 +16,7 @@ const SCALE_FLOOR: f64 = 1e-3;
 /// Minimises `|r(theta)|^2` over `bounds` from `start`.
 ///
 /// Gauss-Newton model in a trust region scaled by the gradient's columns (Levenberg-1944, Marquardt-1963,
-/// More-1978); parameters with two finite bounds are mapped to `[0,1]`. Bounds hold exactly at every evaluation: the
+/// More-1978); parameters with two finite bounds are mapped to `[0,1]`, by their logarithm where both are positive. Bounds hold exactly at every evaluation: the
 /// bounded model is minimised by an active set, parameters at a bound that the cost pushes against are left out.
 /// Directions without influence are not followed. An evaluation that fails, or gives a non-finite number, shortens the
 /// step. `observer` is called after every accepted step and may stop the iteration.
@@ -170,7 +170,7 @@ impl<'a, P: LeastSquares + ?Sized> Iteration<'a, P> {
         let rows = self.residual.len();
         let mut scaled = self.gradient.clone();
         for (j, column) in scaled.chunks_exact_mut(rows.max(1)).enumerate() {
-            let factor = self.bounds.scale(j) / self.scaling[j];
+            let factor = self.bounds.slope(j, self.theta[j]) / self.scaling[j];
             column.iter_mut().for_each(|value| *value *= factor);
         }
         LinearModel::new(&self.residual, &scaled, self.theta.len(), self.options.rank_threshold)
@@ -187,6 +187,12 @@ impl<'a, P: LeastSquares + ?Sized> Iteration<'a, P> {
             return Trial::Stop(StopReason::EvaluationsFail);
         };
         let step_length = norm(&step.z);
+        let cost = self.length * self.length;
+        // The whole Gauss-Newton step promises nothing: there is no need to try it.
+        let promise = step.predicted_reduction / cost;
+        if step.undamped && self.cost_history.len() > 1 && promise <= self.options.cost_tolerance {
+            return Trial::Stop(StopReason::CostConverged);
+        }
         if step_length == 0.0 || step.predicted_reduction <= 0.0 {
             return Trial::Stop(StopReason::GradientConverged);
         }
@@ -200,7 +206,6 @@ impl<'a, P: LeastSquares + ?Sized> Iteration<'a, P> {
             Err(failure) => return self.shorten_after(failure, step_length),
         };
         let length = norm(&residual);
-        let cost = self.length * self.length;
         let relative = length / self.length;
         let actual = if 0.1 * relative < 1.0 { 1.0 - relative * relative } else { -1.0 };
         let predicted = step.predicted_reduction / cost;
@@ -289,7 +294,7 @@ impl<'a, P: LeastSquares + ?Sized> Iteration<'a, P> {
             .gradient
             .chunks_exact(rows)
             .enumerate()
-            .map(|(j, column)| norm(column) * self.bounds.scale(j))
+            .map(|(j, column)| norm(column) * self.bounds.slope(j, self.theta[j]))
             .collect();
         let largest = norms.iter().fold(0.0_f64, |a, &b| a.max(b));
         for j in 0..self.scaling.len() {
@@ -321,7 +326,7 @@ impl<'a, P: LeastSquares + ?Sized> Iteration<'a, P> {
     fn step_limits(&self) -> (Vec<f64>, Vec<f64>) {
         let room = |bound: &[f64]| {
             (0..self.theta.len())
-                .map(|j| (bound[j] - self.theta[j]) * self.scaling[j] / self.bounds.scale(j))
+                .map(|j| self.bounds.distance(j, self.theta[j], bound[j]) * self.scaling[j])
                 .collect::<Vec<f64>>()
         };
         (room(&self.bounds.lower), room(&self.bounds.upper))
@@ -335,8 +340,7 @@ impl<'a, P: LeastSquares + ?Sized> Iteration<'a, P> {
                 } else if z[j] >= upper[j] {
                     self.bounds.upper[j]
                 } else {
-                    let value = self.theta[j] + z[j] * self.bounds.scale(j) / self.scaling[j];
-                    value.clamp(self.bounds.lower[j], self.bounds.upper[j])
+                    self.bounds.moved(j, self.theta[j], z[j] / self.scaling[j])
                 }
             })
             .collect()
@@ -359,7 +363,7 @@ impl<'a, P: LeastSquares + ?Sized> Iteration<'a, P> {
         let gradient = model.cost_gradient();
         let mut largest = 0.0_f64;
         for (j, column) in self.gradient.chunks_exact(rows).enumerate() {
-            let column_norm = norm(column) * self.bounds.scale(j) / self.scaling[j];
+            let column_norm = norm(column) * self.bounds.slope(j, self.theta[j]) / self.scaling[j];
             if !pinned[j] && column_norm > 0.0 {
                 largest = largest.max((gradient[j] / (column_norm * self.length)).abs());
             }

@@ -76,6 +76,42 @@ impl Bounds {
         if width.is_finite() && width > 0.0 { self.lower[index] } else { 0.0 }
     }
 
+    /// Whether the parameter is searched by its logarithm: one between positive bounds scales the model, and residuals depend on
+    /// its factor more evenly than on its difference.
+    fn is_logarithmic(&self, index: usize) -> bool {
+        self.lower[index] > 0.0 && self.upper[index].is_finite() && self.upper[index] > self.lower[index]
+    }
+
+    /// ln(upper / lower): maps the logarithm to `[0,1]`.
+    fn decades(&self, index: usize) -> f64 {
+        (self.upper[index] / self.lower[index]).ln()
+    }
+
+    /// d(theta)/d(coordinate) at `value`, in the coordinate in which the search moves: `[0,1]` between two finite bounds, else the
+    /// parameter itself.
+    pub(super) fn slope(&self, index: usize, value: f64) -> f64 {
+        if self.is_logarithmic(index) { value * self.decades(index) } else { self.scale(index) }
+    }
+
+    /// Difference of two values in that coordinate.
+    pub(super) fn distance(&self, index: usize, from: f64, to: f64) -> f64 {
+        if self.is_logarithmic(index) {
+            (to / from).ln() / self.decades(index)
+        } else {
+            (to - from) / self.scale(index)
+        }
+    }
+
+    /// The value at a distance in that coordinate, held within the bounds.
+    pub(super) fn moved(&self, index: usize, from: f64, distance: f64) -> f64 {
+        let value = if self.is_logarithmic(index) {
+            from * (distance * self.decades(index)).exp()
+        } else {
+            from + distance * self.scale(index)
+        };
+        value.clamp(self.lower[index], self.upper[index])
+    }
+
     pub fn contains(&self, theta: &[f64]) -> bool {
         theta.iter().zip(&self.lower).zip(&self.upper).all(|((value, low), high)| value >= low && value <= high)
     }

@@ -49,7 +49,7 @@ impl RowOrder {
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2+fma"))]
 fn subtract_product(
     starts: &[usize],
     entries: &[(u32, u32)],
@@ -79,7 +79,7 @@ fn subtract_block<const W: usize>(first: usize, (row, values, v, width, target):
         let value = values[index as usize];
         let of_column = &v[column as usize * width + first..][..W];
         for k in 0..W {
-            sum[k] -= value * of_column[k];
+            sum[k] = (-value).mul_add(of_column[k], sum[k]);
         }
     }
     target.copy_from_slice(&sum);
@@ -94,7 +94,7 @@ pub(super) fn eliminate_rows(triangle: TriangularRows, x: &mut [f64], width: usi
     eliminate_all_rows(triangle, x, width, factors);
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2+fma"))]
 fn eliminate_all_rows((rows, columns, values): TriangularRows, x: &mut [f64], width: usize, factors: Option<&[f64]>) {
     let mut begin = 0;
     for &[position, end] in rows {
@@ -115,7 +115,7 @@ fn eliminate_block<const W: usize>(first: usize, ((columns, values), x, width, p
     for (&column, value) in columns.iter().zip(values) {
         let of_column = &x[column as usize * width + first..][..W];
         for k in 0..W {
-            sum[k] -= value * of_column[k];
+            sum[k] = (-value).mul_add(of_column[k], sum[k]);
         }
     }
     for (target, sum) in x[position * width + first..][..W].iter_mut().zip(sum) {
@@ -132,7 +132,7 @@ pub fn combine(out: &mut [f64], base: &[f64], factor: f64, terms: &[(usize, f64)
     combine_all(out, base, factor, terms, vectors);
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2+fma"))]
 fn combine_all(out: &mut [f64], base: &[f64], factor: f64, terms: &[(usize, f64)], vectors: &[Vec<f64>]) {
     in_blocks!(out.len(), 16, 8, 4, 2, 1; combine_block (&mut *out, base, factor, terms, vectors));
 }
@@ -146,12 +146,12 @@ fn combine_block<const W: usize>(first: usize, (out, base, factor, terms, vector
     for &(index, coefficient) in terms {
         let vector = &vectors[index][first..first + W];
         for k in 0..W {
-            sum[k] += coefficient * vector[k];
+            sum[k] = coefficient.mul_add(vector[k], sum[k]);
         }
     }
     let (out, base) = (&mut out[first..first + W], &base[first..first + W]);
     for k in 0..W {
-        out[k] = base[k] + factor * sum[k];
+        out[k] = factor.mul_add(sum[k], base[k]);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::events::{Change, Events, When};
 use super::expansion::Expansion;
+use super::kernels::LANES;
 use super::kinks::{Kinks, comparisons};
 use super::model::{Derivative, DerivativeForm, Element, Layout, Model, Sources, StartProgram};
 use super::program::{Line, Program};
@@ -139,7 +140,7 @@ impl Model {
         prologue.extend(assembler.take_copies());
         let constant_end = assembler.constants.len();
         let mut registers = assembler.constants;
-        registers.resize(assembler.next, 0.0);
+        registers.resize(assembler.next + LANES, 0.0);
         debug_assert_eq!(p, system.parameter_names.len());
         Model {
             curves: system.graph.curves().to_vec(),

@@ -1,7 +1,9 @@
 //! Elementary functions without branches, so that a loop over them becomes vector instructions; exact to about two units in the
-//! last place, and the same digits whatever the width of the vectors (no fused operations).
+//! last place, and the same digits whatever the width of the vectors. Products are added without being rounded, on every processor.
 //!
 //! Reduction and series after Cody-Waite-1980; the series are those of Taylor, long enough for the reduced range.
+
+use multiversion::multiversion;
 
 /// Adding and subtracting it rounds to the nearest integer, which then stands in the low bits.
 const ROUNDING: f64 = 6_755_399_441_055_744.0;
@@ -55,7 +57,7 @@ fn polynomial<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
         // Pairs from the end of the low powers; an odd one out stays the highest.
         let odd = count % 2;
         for k in 0..count / 2 {
-            sums[odd + k] = sums[odd + 2 * k] * power + sums[odd + 2 * k + 1];
+            sums[odd + k] = sums[odd + 2 * k].mul_add(power, sums[odd + 2 * k + 1]);
         }
         count = odd + count / 2;
         power *= power;
@@ -66,12 +68,12 @@ fn polynomial<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
 /// Sine and cosine of the angle less its nearest multiple of pi/2, and that multiple in the low bits.
 #[inline(always)]
 fn reduced(x: f64) -> (f64, f64, u64) {
-    let shifted = x * std::f64::consts::FRAC_2_PI + ROUNDING;
+    let shifted = x.mul_add(std::f64::consts::FRAC_2_PI, ROUNDING);
     let quarter = shifted - ROUNDING;
-    let r = ((x - quarter * HALF_PI[0]) - quarter * HALF_PI[1]) - quarter * HALF_PI[2];
+    let r = HALF_PI.iter().fold(x, |rest, part| (-quarter).mul_add(*part, rest));
     let square = r * r;
-    let sine = r - r * square * polynomial(&SINE, square);
-    let cosine = 1.0 - (0.5 * square - square * square * polynomial(&COSINE, square));
+    let sine = (-(r * square)).mul_add(polynomial(&SINE, square), r);
+    let cosine = 1.0 - 0.5_f64.mul_add(square, -(square * square * polynomial(&COSINE, square)));
     (sine, cosine, shifted.to_bits())
 }
 
@@ -91,10 +93,12 @@ pub(super) fn cos(x: f64) -> f64 {
     f64::from_bits(value.to_bits() ^ ((quarter.wrapping_add(1) & 2) << 62))
 }
 
+#[multiversion(targets("x86_64+avx2+fma"))]
 pub(super) fn sin_of_any(x: f64) -> f64 {
     if x.abs() <= LARGEST_ANGLE { sin(x) } else { x.sin() }
 }
 
+#[multiversion(targets("x86_64+avx2+fma"))]
 pub(super) fn cos_of_any(x: f64) -> f64 {
     if x.abs() <= LARGEST_ANGLE { cos(x) } else { x.cos() }
 }
@@ -108,10 +112,10 @@ fn power_of_two(shifted: f64) -> f64 {
 /// e^r - 1 for the rest r of `x` beyond k ln 2, and k + [`ROUNDING`].
 #[inline(always)]
 fn reduced_exponential(x: f64) -> (f64, f64) {
-    let shifted = x * std::f64::consts::LOG2_E + ROUNDING;
+    let shifted = x.mul_add(std::f64::consts::LOG2_E, ROUNDING);
     let k = shifted - ROUNDING;
-    let r = (x - k * LN_2[0]) - k * LN_2[1];
-    (r + r * r * polynomial(&EXPONENTIAL, r), shifted)
+    let r = LN_2.iter().fold(x, |rest, part| (-k).mul_add(*part, rest));
+    ((r * r).mul_add(polynomial(&EXPONENTIAL, r), r), shifted)
 }
 
 #[inline(always)]
@@ -122,7 +126,7 @@ pub(super) fn exp(x: f64) -> f64 {
     let (rest, shifted) = reduced_exponential(x);
     // In two factors, so that results near overflow and underflow come out right.
     let k = shifted - ROUNDING;
-    let half = 0.5 * k + ROUNDING;
+    let half = 0.5_f64.mul_add(k, ROUNDING);
     let other = (k - (half - ROUNDING)) + ROUNDING;
     (1.0 + rest) * power_of_two(half) * power_of_two(other)
 }
@@ -134,8 +138,20 @@ pub(super) fn tanh(x: f64) -> f64 {
     let (rest, shifted) = reduced_exponential(2.0 * size);
     let power = power_of_two(shifted);
     // e^(2|x|) - 1, without cancellation near zero.
-    let growth = power * rest + (power - 1.0);
+    let growth = power.mul_add(rest, power - 1.0);
     (growth / (growth + 2.0)).copysign(x)
+}
+
+/// [`exp`] as a call, with the instructions that the processor has.
+#[multiversion(targets("x86_64+avx2+fma"))]
+pub(super) fn exp_of_one(x: f64) -> f64 {
+    exp(x)
+}
+
+/// [`tanh`] in the same way.
+#[multiversion(targets("x86_64+avx2+fma"))]
+pub(super) fn tanh_of_one(x: f64) -> f64 {
+    tanh(x)
 }
 
 #[cfg(test)]

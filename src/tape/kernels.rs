@@ -10,13 +10,12 @@ use multiversion::multiversion;
 ///
 /// # Safety
 ///
-/// `registers` must reach beyond the last target of every run; operands, `listed` ones too, must stand below the first target
-/// of their run; lists must be as long as the run.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+/// All operands and targets must be among the `registers`, the former with room for [`LANES`] numbers per block behind the first of
+/// consecutive ones; lists must name as many registers as the blocks of their run have numbers.
+#[multiversion(targets("x86_64+avx2+fma"))]
 pub(super) unsafe fn execute(runs: &[Run], listed: &[u32], registers: &mut [f64], inputs: &dyn InputSource) {
     for run in runs {
-        // SAFETY: what the caller promises.
-        let kernel = unsafe { Kernel::new(run, listed, registers) };
+        let kernel = Kernel { run, listed, registers: registers.as_mut_ptr() };
         match run.instruction {
             Instruction::Unary(function) => unary(function, kernel),
             Instruction::Binary(function) => binary(function, kernel),
@@ -57,167 +56,223 @@ fn binary(function: Binary, kernel: Kernel) {
 
 #[inline(always)]
 fn select(kernel: Kernel) {
-    if kernel.run.forms == [Form::Consecutive; 3] {
-        let [condition, then, otherwise] = [0, 1, 2].map(|operand| kernel.consecutive(operand));
-        for (((result, c), a), b) in kernel.results.iter_mut().zip(condition).zip(then).zip(otherwise) {
-            *result = if *c != 0.0 { *a } else { *b };
-        }
-        return;
-    }
-    for offset in 0..kernel.results.len() {
-        let operand = if kernel.read(0, offset) != 0.0 { 1 } else { 2 };
-        kernel.results[offset] = kernel.read(operand, offset);
+    kernel.map_three(|condition, then, otherwise| if condition != 0.0 { then } else { otherwise });
+}
+
+/// Numbers computed at a time. The last ones of a run may stand for nothing: they are not stored.
+pub(super) const LANES: usize = 8;
+
+type Block = [f64; LANES];
+
+/// An operand of all instructions of a run, block by block.
+trait Operand: Copy {
+    /// # Safety
+    ///
+    /// The run must have the block, and what [`execute`] asks for must hold.
+    unsafe fn block(self, index: usize) -> Block;
+}
+
+#[derive(Clone, Copy)]
+struct Consecutive(*const f64);
+
+impl Operand for Consecutive {
+    #[inline(always)]
+    unsafe fn block(self, index: usize) -> Block {
+        // SAFETY: the file of registers reaches beyond the last block.
+        unsafe { self.0.add(LANES * index).cast::<Block>().read() }
     }
 }
 
-/// Operands and results of a run.
+#[derive(Clone, Copy)]
+struct Same(f64);
+
+impl Operand for Same {
+    #[inline(always)]
+    unsafe fn block(self, _: usize) -> Block {
+        [self.0; LANES]
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Listed {
+    registers: *const f64,
+    list: *const u32,
+}
+
+impl Operand for Listed {
+    #[inline(always)]
+    unsafe fn block(self, index: usize) -> Block {
+        // SAFETY: lists are as long as the blocks of their run and name registers of the file.
+        let list = unsafe { self.list.add(LANES * index).cast::<[u32; LANES]>().read() };
+        // SAFETY: the same.
+        let mut block = [0.0; LANES];
+        for lane in 0..LANES {
+            block[lane] = unsafe { *self.registers.add(list[lane] as usize) };
+        }
+        block
+    }
+}
+
+/// Calls a function with the operand of a run in its form.
+macro_rules! with_operand {
+    ($kernel:ident, $index:literal, $operand:ident => $call:expr) => {
+        match $kernel.run.forms[$index] {
+            Form::Consecutive => {
+                let $operand = Consecutive($kernel.at($kernel.run.operands[$index]));
+                $call
+            }
+            Form::Same => {
+                let $operand = Same($kernel.value($kernel.run.operands[$index]));
+                $call
+            }
+            Form::Listed => {
+                let $operand = $kernel.listed($kernel.run.operands[$index]);
+                $call
+            }
+        }
+    };
+}
+
+/// A run over a file of registers.
+#[derive(Clone, Copy)]
 struct Kernel<'a> {
     run: &'a Run,
     listed: &'a [u32],
-    /// The registers below the first target.
-    known: &'a [f64],
-    results: &'a mut [f64],
+    registers: *mut f64,
 }
 
-/// An operand in registers of a list.
-struct Listed<'a> {
-    known: &'a [f64],
-    list: &'a [u32],
-}
-
-impl Listed<'_> {
+impl Kernel<'_> {
     #[inline(always)]
-    fn read(&self, offset: usize) -> f64 {
-        // SAFETY: lists are as long as their run and name registers below its first target ([`execute`]).
-        unsafe { *self.known.get_unchecked(*self.list.get_unchecked(offset) as usize) }
+    fn at(self, register: u32) -> *mut f64 {
+        // SAFETY: registers of the program exist ([`execute`]).
+        unsafe { self.registers.add(register as usize) }
     }
-}
 
-impl<'a> Kernel<'a> {
-    /// # Safety
-    ///
-    /// As [`execute`].
     #[inline(always)]
-    unsafe fn new(run: &'a Run, listed: &'a [u32], registers: &'a mut [f64]) -> Self {
-        let (first, count) = (run.first_target as usize, run.count as usize);
-        // SAFETY: what the caller promises.
-        let (known, rest) = unsafe { registers.split_at_mut_unchecked(first) };
+    fn value(self, register: u32) -> f64 {
         // SAFETY: the same.
-        let results = unsafe { rest.get_unchecked_mut(..count) };
-        Self { run, listed, known, results }
+        unsafe { *self.at(register) }
     }
 
     #[inline(always)]
-    fn consecutive(&self, operand: usize) -> &'a [f64] {
-        let first = self.run.operands[operand] as usize;
-        // SAFETY: operands stand below the first target ([`execute`]).
-        unsafe { self.known.get_unchecked(first..first + self.results.len()) }
+    fn listed(self, first: u32) -> Listed {
+        // SAFETY: lists are as long as their runs ([`execute`]).
+        Listed { registers: self.registers, list: unsafe { self.listed.as_ptr().add(first as usize) } }
     }
 
     #[inline(always)]
-    fn same(&self, operand: usize) -> f64 {
-        // SAFETY: as above.
-        unsafe { *self.known.get_unchecked(self.run.operands[operand] as usize) }
+    fn count(self) -> usize {
+        self.run.count as usize
     }
 
     #[inline(always)]
-    fn listed(&self, operand: usize) -> Listed<'a> {
-        let first = self.run.operands[operand] as usize;
-        // SAFETY: lists are as long as their run ([`execute`]).
-        let list = unsafe { self.listed.get_unchecked(first..first + self.results.len()) };
-        Listed { known: self.known, list }
-    }
-
-    #[inline(always)]
-    fn read(&self, operand: usize, offset: usize) -> f64 {
+    fn read(self, operand: usize, offset: usize) -> f64 {
+        let first = self.run.operands[operand];
         match self.run.forms[operand] {
-            Form::Consecutive => self.consecutive(operand)[offset],
-            Form::Same => self.same(operand),
-            Form::Listed => self.listed(operand).read(offset),
+            Form::Consecutive => self.value(first + offset as u32),
+            Form::Same => self.value(first),
+            Form::Listed => self.value(self.listed[first as usize + offset]),
         }
     }
 
     /// Whether all of the first operand are at most `limit` in size.
     #[inline(always)]
-    fn is_within(&self, limit: f64) -> bool {
-        match self.run.forms[0] {
-            Form::Consecutive => self.consecutive(0).iter().fold(true, |within, a| within & (a.abs() <= limit)),
-            _ => (0..self.results.len()).all(|offset| self.read(0, offset).abs() <= limit),
+    fn is_within(self, limit: f64) -> bool {
+        let is_small = |value: f64| value.abs() <= limit;
+        if self.run.forms[0] == Form::Consecutive {
+            let first = self.at(self.run.operands[0]);
+            // SAFETY: operands stand in the file.
+            let values = unsafe { std::slice::from_raw_parts(first, self.count()) };
+            return values.iter().fold(true, |within, value| within & is_small(*value));
+        }
+        (0..self.count()).all(|offset| is_small(self.read(0, offset)))
+    }
+
+    /// Computes block by block; operands are read before results are written, so that blocks may reach into them.
+    #[inline(always)]
+    fn store(self, function: impl Fn(usize) -> Block) {
+        let (whole, rest) = (self.count() / LANES, self.count() % LANES);
+        let target = self.at(self.run.first_target);
+        for index in 0..whole {
+            let block = function(index);
+            // SAFETY: results stand in the file.
+            unsafe { target.add(LANES * index).cast::<Block>().write(block) };
+        }
+        if rest > 0 {
+            let block = function(whole);
+            let (mut from, mut to) = (block.as_ptr(), target.wrapping_add(LANES * whole));
+            // In halves: a loop over what is left would become a call.
+            // SAFETY: the same; the parts together are as long as the rest.
+            unsafe {
+                if rest & 4 != 0 {
+                    to.cast::<[f64; 4]>().write(from.cast::<[f64; 4]>().read());
+                    (from, to) = (from.add(4), to.add(4));
+                }
+                if rest & 2 != 0 {
+                    to.cast::<[f64; 2]>().write(from.cast::<[f64; 2]>().read());
+                    (from, to) = (from.add(2), to.add(2));
+                }
+                if rest & 1 != 0 {
+                    to.write(from.read());
+                }
+            }
         }
     }
 
     #[inline(always)]
-    fn map_one(self, function: impl Fn(f64) -> f64) {
-        match self.run.forms[0] {
-            Form::Consecutive => {
-                let a = self.consecutive(0);
-                self.results.iter_mut().zip(a).for_each(|(result, a)| *result = function(*a));
+    fn map_one(self, function: impl Fn(f64) -> f64 + Copy) {
+        // SAFETY: `store` asks for the run's blocks.
+        with_operand!(self, 0, a => self.store(#[inline(always)] |index| {
+            let a = unsafe { a.block(index) };
+            let mut results = [0.0; LANES];
+            for lane in 0..LANES {
+                results[lane] = function(a[lane]);
             }
-            Form::Same => {
-                let value = function(self.same(0));
-                self.results.fill(value);
-            }
-            Form::Listed => {
-                let a = self.listed(0);
-                self.results.iter_mut().enumerate().for_each(|(i, result)| *result = function(a.read(i)));
-            }
-        }
+            results
+        }));
     }
 
     #[inline(always)]
-    fn map_two(self, function: impl Fn(f64, f64) -> f64) {
-        match (self.run.forms[0], self.run.forms[1]) {
-            (Form::Consecutive, Form::Consecutive) => {
-                let (a, b) = (self.consecutive(0), self.consecutive(1));
-                self.results.iter_mut().zip(a).zip(b).for_each(|((result, a), b)| *result = function(*a, *b));
+    fn map_two(self, function: impl Fn(f64, f64) -> f64 + Copy) {
+        with_operand!(self, 0, a => with_operand!(self, 1, b => self.store(#[inline(always)] |index| {
+            // SAFETY: `store` asks for the run's blocks.
+            let (a, b) = unsafe { (a.block(index), b.block(index)) };
+            let mut results = [0.0; LANES];
+            for lane in 0..LANES {
+                results[lane] = function(a[lane], b[lane]);
             }
-            (Form::Consecutive, Form::Same) => {
-                let (a, b) = (self.consecutive(0), self.same(1));
-                self.results.iter_mut().zip(a).for_each(|(result, a)| *result = function(*a, b));
+            results
+        })));
+    }
+
+    #[inline(always)]
+    fn map_three(self, function: impl Fn(f64, f64, f64) -> f64 + Copy) {
+        with_operand!(self, 0, a => with_operand!(self, 1, b => with_operand!(self, 2, c => self.store(#[inline(always)] |index| {
+            // SAFETY: `store` asks for the run's blocks.
+            let (a, b, c) = unsafe { (a.block(index), b.block(index), c.block(index)) };
+            let mut results = [0.0; LANES];
+            for lane in 0..LANES {
+                results[lane] = function(a[lane], b[lane], c[lane]);
             }
-            (Form::Same, Form::Consecutive) => {
-                let (a, b) = (self.same(0), self.consecutive(1));
-                self.results.iter_mut().zip(b).for_each(|(result, b)| *result = function(a, *b));
-            }
-            (Form::Consecutive, Form::Listed) => {
-                let (a, b) = (self.consecutive(0), self.listed(1));
-                self.results.iter_mut().zip(a).enumerate().for_each(|(i, (r, a))| *r = function(*a, b.read(i)));
-            }
-            (Form::Listed, Form::Consecutive) => {
-                let (a, b) = (self.listed(0), self.consecutive(1));
-                self.results.iter_mut().zip(b).enumerate().for_each(|(i, (r, b))| *r = function(a.read(i), *b));
-            }
-            (Form::Same, Form::Listed) => {
-                let (a, b) = (self.same(0), self.listed(1));
-                self.results.iter_mut().enumerate().for_each(|(i, result)| *result = function(a, b.read(i)));
-            }
-            (Form::Listed, Form::Same) => {
-                let (a, b) = (self.listed(0), self.same(1));
-                self.results.iter_mut().enumerate().for_each(|(i, result)| *result = function(a.read(i), b));
-            }
-            (Form::Listed, Form::Listed) => {
-                let (a, b) = (self.listed(0), self.listed(1));
-                self.results.iter_mut().enumerate().for_each(|(i, result)| *result = function(a.read(i), b.read(i)));
-            }
-            (Form::Same, Form::Same) => {
-                let value = function(self.same(0), self.same(1));
-                self.results.fill(value);
-            }
-        }
+            results
+        }))));
     }
 
     /// For functions that are calls anyway.
     #[inline(always)]
     fn map_one_out_of_line(self, function: impl Fn(f64) -> f64) {
-        for offset in 0..self.results.len() {
-            self.results[offset] = function(self.read(0, offset));
+        for offset in 0..self.count() {
+            // SAFETY: results stand in the file.
+            unsafe { *self.at(self.run.first_target + offset as u32) = function(self.read(0, offset)) };
         }
     }
 
     #[inline(always)]
     fn map_two_out_of_line(self, function: impl Fn(f64, f64) -> f64) {
-        for offset in 0..self.results.len() {
-            self.results[offset] = function(self.read(0, offset), self.read(1, offset));
+        for offset in 0..self.count() {
+            let value = function(self.read(0, offset), self.read(1, offset));
+            // SAFETY: results stand in the file.
+            unsafe { *self.at(self.run.first_target + offset as u32) = value };
         }
     }
 }

@@ -271,11 +271,11 @@ extern "C" fn cosine(_: &Unary, a: f64) -> f64 {
 }
 
 extern "C" fn hyperbolic_tangent(_: &Unary, a: f64) -> f64 {
-    elementary::tanh(a)
+    elementary::tanh_of_one(a)
 }
 
 extern "C" fn exponential(_: &Unary, a: f64) -> f64 {
-    elementary::exp(a)
+    elementary::exp_of_one(a)
 }
 
 extern "C" fn unary(function: &Unary, a: f64) -> f64 {

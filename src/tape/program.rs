@@ -140,15 +140,18 @@ impl Program {
             count: count as u32,
             operands: head.operands,
         };
+        let numbers = count.next_multiple_of(kernels::LANES);
         for k in 0..instruction.operand_count() {
             let registers = lines.iter().map(|line| line.operands[k]);
             run.forms[k] = form(registers.clone());
             if run.forms[k] == Form::Listed {
                 run.operands[k] = self.listed.len() as u32;
                 self.listed.extend(registers);
+                self.listed.resize(run.operands[k] as usize + numbers, head.operands[k]);
             }
         }
-        self.register_count = self.register_count.max(head.target as usize + count);
+        // Operands stand below the target.
+        self.register_count = self.register_count.max(head.target as usize + numbers);
         self.runs.push(run);
     }
 
