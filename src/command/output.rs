@@ -5,10 +5,12 @@ use crate::report::page::RenderError;
 use std::io::Write;
 use std::path::Path;
 
-/// Writes `content` to a temporary file beside `path` and renames it.
+/// Writes `content` to a temporary file beside `path` and renames it. Folders that do not exist are made: an answer of minutes is not
+/// thrown away for the want of one.
 pub(super) fn write_whole(path: &Path, content: &str) -> Result<(), Failed> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let written = tempfile::Builder::new().prefix(".ident").tempfile_in(folder).and_then(|mut file| {
+    let temporary = || tempfile::Builder::new().prefix(".ident").tempfile_in(folder);
+    let written = std::fs::create_dir_all(folder).and_then(|()| temporary()).and_then(|mut file| {
         file.write_all(content.as_bytes())?;
         file.flush()?;
         readable(&file)?;

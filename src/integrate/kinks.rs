@@ -13,7 +13,6 @@ const POINTS: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 const MAXIMUM_ITERATIONS: usize = 40;
 /// Zeros are located to this share of the step.
 const LOCATED: f64 = 1e-7;
-
 /// Crossings are expected in so many times the next step.
 const FAR: f64 = 1.3;
 /// Distance of differences, as a share of a step.
@@ -153,9 +152,7 @@ impl Kinks {
         }
         None
     }
-}
 
-impl Kinks {
     /// The zero of a kink near the end of a step, as a share of it, by a step of Newton's method from the end.
     pub fn near_end<D: Dynamics + ?Sized>(
         &mut self,

@@ -456,9 +456,7 @@ impl RungeKutta {
         let share = 1.0 - (self.time - t) / self.last_step;
         match self.pair {
             Pair::Five => {
-                let weights = tsitouras::interpolation(share);
-                let terms: [(usize, f64); tsitouras::STAGES] = std::array::from_fn(|stage| (stage, weights[stage]));
-                combine(z, &self.before, self.last_step, &terms, &self.stages);
+                combine(z, &self.before, self.last_step, &tsitouras::interpolation(share), &self.stages);
             }
             Pair::Eight => self.interpolate_eight(share, z),
         }

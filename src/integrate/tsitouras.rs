@@ -58,10 +58,10 @@ pub(super) const ERROR_ROW: Row = &row(ERROR);
 /// The method is stable for real eigenvalues down to `-STABILITY / h`.
 pub(super) const STABILITY: f64 = 3.5;
 
-/// Weights of the stages for the solution at the share `x` of the step.
-pub(super) fn interpolation(x: f64) -> [f64; STAGES] {
+/// The stages with their weights for the solution at the share `x` of the step.
+pub(super) fn interpolation(x: f64) -> [(usize, f64); STAGES] {
     let square = x * x;
-    [
+    let weights = [
         -1.053_088_497_729_021_6
             * x
             * (x - 1.329_989_018_975_141)
@@ -72,7 +72,8 @@ pub(super) fn interpolation(x: f64) -> [f64; STAGES] {
         47.379_521_962_819_28 * (x - 1.203_071_208_372_362_6) * (x - 0.658_047_292_653_547_4) * square,
         -34.870_657_861_496_61 * (x - 1.2) * (x - 2.0 / 3.0) * square,
         2.5 * (x - 1.0) * (x - 0.6) * square,
-    ]
+    ];
+    std::array::from_fn(|stage| (stage, weights[stage]))
 }
 
 #[cfg(test)]
@@ -156,13 +157,13 @@ mod tests {
     fn interpolant_has_order_4_everywhere_and_meets_the_ends() {
         for step in 0..=10 {
             let x = step as f64 / 10.0;
-            let weights = interpolation(x);
+            let weights = interpolation(x).map(|(_, weight)| weight);
             for (order, tree, density) in trees().into_iter().filter(|(order, ..)| *order <= 4) {
                 let exact = x.powi(order as i32) / density;
                 assert!((dot(&weights, &tree) - exact).abs() < 1e-13, "x {x}, order {order}");
             }
         }
-        for (a, b) in interpolation(1.0).iter().zip(WEIGHTS) {
+        for ((_, a), b) in interpolation(1.0).into_iter().zip(WEIGHTS) {
             assert!((a - b).abs() < 1e-13);
         }
     }

@@ -81,10 +81,17 @@ fn rounded(time: f64, other: f64) -> String {
     format!("{time:.decimals$}")
 }
 
+/// In the unit that gives one to three digits before the point.
+fn duration(seconds: f64) -> String {
+    let units = [(1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns")];
+    let (size, unit) = units.into_iter().find(|(size, _)| seconds >= *size).unwrap_or(units[3]);
+    format!("{:.3} {unit}", seconds / size)
+}
+
 impl fmt::Display for Slowness {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mean = 1e3 * self.duration / self.steps.max(1) as f64;
-        writeln!(formatter, "{} steps for {} s, {mean:.3} ms on average", self.steps, self.duration)?;
+        let mean = duration(self.duration / self.steps.max(1) as f64);
+        writeln!(formatter, "{} steps for {} s, {mean} on average", self.steps, self.duration)?;
         writeln!(
             formatter,
             "tried again: {} for their error, {} for their equations",
@@ -124,6 +131,11 @@ mod tests {
         let slowness = Slowness::new(&work(), |i| ["a", "glide_front.velocity", "c"][i].to_owned());
         assert_eq!(slowness.foremost().as_deref(), Some("glide_front.velocity in 83 % of the steps, 3.20 to 3.30 s"));
         assert_eq!(slowness.limits.len(), 2);
+        assert!(slowness.to_string().starts_with("1000 steps for 10 s, 10.000 ms on average"), "{slowness}");
+        assert_eq!(
+            [duration(2.5e11), duration(3.1e-5), duration(1e-12)],
+            ["250000000000.000 s", "31.000 us", "0.001 ns"]
+        );
         assert!(slowness.to_string().contains("a in 17 % of the steps, 0.0 to 8.0 s"), "{slowness}");
     }
 }

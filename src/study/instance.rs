@@ -6,7 +6,7 @@ use super::fields::{FlatField, flatten};
 use super::kinds::{Form, Kinds};
 use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
 use crate::expression::Node;
-use crate::quantities::{AngleContent, Dimension};
+use crate::quantities::{AngleContent, Dimension, Unit};
 use crate::syntax::{Declared, EventDeclaration, Expression, Field, Name, StateDeclaration};
 
 pub(super) struct Instance<'a> {
@@ -168,10 +168,15 @@ impl<'a> Checker<'a> {
         }
         known.extend(["t".to_owned(), "pi".to_owned()]);
         let message = format!("there is no `{}` in this declaration", name.text);
-        let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, message)
+        let mut diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, message)
             .label(name.span, "not declared here")
             .suggest(similar_name(&name.text, known.iter().map(String::as_str)))
             .note(format!("known here: {}", known.join(", ")));
+        if Unit::parse(&name.text).is_ok() {
+            let unit = &name.text;
+            diagnostic =
+                diagnostic.note(format!("`{unit}` as a unit stands right behind its number: `2 {unit}`, `2 1/{unit}`"));
+        }
         self.fail(diagnostic, Scope::Instance(index))
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Branches, Pair, RungeKutta};
 use crate::integrate::augmented::Augmented;
-use crate::integrate::kinks::Kink;
+use crate::integrate::kinks::{Kink, Kinks};
 use crate::integrate::problem::Dynamics;
 use crate::integrate::tsitouras;
 use crate::linear::combine;
@@ -28,6 +28,13 @@ pub(super) struct Aim {
     pub jump: f64,
     /// Attempts still allowed to come closer.
     pub corrections: u32,
+}
+
+impl Aim {
+    /// At a kink that is located already: the end of the step needs no correction.
+    fn located(kink: Kink, step: f64) -> Self {
+        Self { kink, step, jump: 0.0, corrections: 0 }
+    }
 }
 
 /// Kinks in an attempt.
@@ -67,9 +74,9 @@ impl RungeKutta {
         if jump <= HARMLESS {
             return Crossing::Harmless(beyond);
         }
-        let mut kinks = std::mem::take(&mut self.kinks);
-        let found = kinks.find(system, (self.time, h), &sides, |share, y| self.interpolate_attempt(share, h, y));
-        self.kinks = kinks;
+        let found = self.with_kinks(|kinks, method| {
+            kinks.find(system, (method.time, h), &sides, |share, y| method.interpolate_attempt(share, h, y))
+        });
         match found {
             Some(kink) if kink.share >= SMALLEST_SHARE => {
                 self.kinks.mark_harmful(&kink);
@@ -86,10 +93,10 @@ impl RungeKutta {
         aim: &mut Aim,
         h: f64,
     ) -> Option<f64> {
-        let mut kinks = std::mem::take(&mut self.kinks);
-        let interpolate = |share: f64, y: &mut [f64]| self.interpolate_attempt(share, h, y);
-        let share = kinks.near_end(system, (self.time, h), &aim.kink, interpolate);
-        self.kinks = kinks;
+        let share = self.with_kinks(|kinks, method| {
+            let interpolate = |share: f64, y: &mut [f64]| method.interpolate_attempt(share, h, y);
+            kinks.near_end(system, (method.time, h), &aim.kink, interpolate)
+        });
         let is_close = (share - 1.0).abs() * h * aim.jump <= HARMLESS || aim.corrections == 0;
         aim.corrections = aim.corrections.saturating_sub(1);
         (!is_close).then_some(share)
@@ -112,13 +119,19 @@ impl RungeKutta {
         system.rates(self.time, &self.current, &mut self.stages[0]);
     }
 
+    /// Works on the kinks with the rest of the method at hand.
+    fn with_kinks<T>(&mut self, work: impl FnOnce(&mut Kinks, &mut Self) -> T) -> T {
+        let mut kinks = std::mem::take(&mut self.kinks);
+        let result = work(&mut kinks, self);
+        self.kinks = kinks;
+        result
+    }
+
     /// The state within the attempted step, at a share of it.
     fn interpolate_attempt(&self, share: f64, h: f64, y: &mut [f64]) {
         match self.pair {
             Pair::Five => {
-                let weights = tsitouras::interpolation(share);
-                let terms: [(usize, f64); tsitouras::STAGES] = std::array::from_fn(|stage| (stage, weights[stage]));
-                combine(y, &self.current[..y.len()], h, &terms, &self.stages);
+                combine(y, &self.current[..y.len()], h, &tsitouras::interpolation(share), &self.stages);
             }
             // By Hermite's cubic: the method's own interpolant needs further stages.
             Pair::Eight => {
@@ -143,23 +156,24 @@ impl RungeKutta {
         }
         let sides = sides.clone();
         self.attempt_state(system, h);
-        let mut kinks = std::mem::take(&mut self.kinks);
-        let found = kinks.find(system, (self.time, h), &sides, |share, y| self.interpolate_attempt(share, h, y));
-        let found = found.filter(|kink| kink.share >= SMALLEST_SHARE).and_then(|mut kink| {
+        self.with_kinks(|kinks, method| {
+            let interpolate = |share: f64, y: &mut [f64]| method.interpolate_attempt(share, h, y);
+            let mut kink = kinks.find(system, (method.time, h), &sides, interpolate)?;
+            if kink.share < SMALLEST_SHARE {
+                return None;
+            }
             for _ in 0..MOST_CORRECTIONS {
                 let length = kink.share * h;
-                self.attempt_state(system, length);
-                let interpolate = |share: f64, y: &mut [f64]| self.interpolate_attempt(share, length, y);
-                let factor = kinks.near_end(system, (self.time, length), &kink, interpolate);
+                method.attempt_state(system, length);
+                let interpolate = |share: f64, y: &mut [f64]| method.interpolate_attempt(share, length, y);
+                let factor = kinks.near_end(system, (method.time, length), &kink, interpolate);
                 kink.share *= factor;
                 if (factor - 1.0).abs() <= REACHED {
-                    return (kink.share <= 1.0).then_some(Aim { kink, step: h, jump: 0.0, corrections: 0 });
+                    return (kink.share <= 1.0).then(|| Aim::located(kink, h));
                 }
             }
             None
-        });
-        self.kinks = kinks;
-        found
+        })
     }
 
     /// All stages of a step of the state without its sensitivities.
