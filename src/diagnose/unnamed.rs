@@ -26,6 +26,8 @@ const UNEXPLAINED: f64 = 0.3;
 const LEAST_GAIN: f64 = 0.5;
 /// Share of the held-out error that a curve must take: so many points follow the shadow of something else a little way.
 const LEAST_SHARE: f64 = 0.25;
+/// Curves at two places that explain the same but for this share of it are as good.
+const SAME_GAIN: f64 = 0.99;
 /// A search that was asked to end before so many causes may not have come to what it would name.
 const CHAIN: usize = 3;
 /// Curves refitted after the screen, and in how many iterations: beside a misfit that other parameters have bent to, the screen's linear
@@ -90,8 +92,9 @@ fn trial(
     let judged = judge::judge(&round, &candidates, refits, held_out.as_ref());
     course.simulations += judged.iter().map(|entry| entry.refitted.fitted.simulations).sum::<usize>();
     let chosen = judged.iter().position(Judged::accepted).filter(|position| {
-        let place = &candidates[judged[*position].refitted.candidate].place;
-        let is_patchwork = course.crowded().as_ref() == Some(place);
+        let index = judged[*position].refitted.candidate;
+        let is_patchwork =
+            course.crowded().is_some_and(|place| serves_at(&place, index, &candidates, &screened, &round));
         let wins = |rival: &Model| beats(&judged[*position], rival, &validation, is_patchwork);
         let shows = judged[*position].held_out_change.is_none_or(|change| change <= -LEAST_SHARE);
         shows && !judge::below_visibility(&round, &judged[*position]) && rival.is_none_or(wins)
@@ -113,6 +116,24 @@ fn trial(
     course.record(&round, &candidates, &screened, &judged, Some(position));
     course.texts.push(text);
     Ok(Some(next))
+}
+
+/// Whether the screen saw the curve of a candidate explain as much at `place`: places that move alike differ by rounding only.
+fn serves_at(
+    place: &str,
+    index: usize,
+    candidates: &[Candidate],
+    screened: &[Option<Screened>],
+    round: &Round,
+) -> bool {
+    let gain = |entry: &Screened| round.current_deviance() - entry.deviance;
+    let own = screened[index].as_ref().map_or(f64::INFINITY, gain);
+    candidates.iter().zip(screened).any(|(candidate, entry)| {
+        let serves = |entry: &Screened| gain(entry) >= SAME_GAIN * own;
+        candidate.place == place
+            && candidate.effect == candidates[index].effect
+            && (candidate.name == candidates[index].name || entry.as_ref().is_some_and(serves))
+    })
 }
 
 /// Why no curve was taken, for readers who wonder about what is left.

@@ -9,8 +9,8 @@ const PARTS: usize = 200;
 
 /// Wraps [`Dynamics`] for a vector `z` of length n (1 + p): first y, then the sensitivities row by row (component i,
 /// then parameter j), so that operations on a row run over all parameters without a gap.
-pub(super) struct Augmented<'d, D: ?Sized> {
-    pub dynamics: &'d mut D,
+pub(super) struct Augmented<'d> {
+    pub dynamics: &'d mut dyn Dynamics,
     pub n: usize,
     /// Number of sensitivity columns carried; 0 in a nominal run.
     pub p: usize,
@@ -29,8 +29,8 @@ pub(super) struct Augmented<'d, D: ?Sized> {
     parameter_places: Vec<usize>,
 }
 
-impl<'d, D: Dynamics + ?Sized> Augmented<'d, D> {
-    pub fn new(dynamics: &'d mut D, with_sensitivities: bool, t: f64, y: &[f64], y_prime: &[f64]) -> Self {
+impl<'d> Augmented<'d> {
+    pub fn new(dynamics: &'d mut dyn Dynamics, with_sensitivities: bool, t: f64, y: &[f64], y_prime: &[f64]) -> Self {
         let n = dynamics.dimension();
         let p = if with_sensitivities { dynamics.parameter_count() } else { 0 };
         let pattern = dynamics.pattern();

@@ -8,7 +8,7 @@ use super::augmented::Augmented;
 use super::bdf_history::{History, MAXIMUM_ORDER};
 use super::newton::{Newton, NewtonFailure, StepEnd};
 use super::norm::{ErrorNorm, Size};
-use super::problem::{Branches, Dynamics, FailureCause, PlannedStep};
+use super::problem::{Branches, FailureCause, PlannedStep};
 use super::stepper::{Limits, Refusal, first_not_finite};
 
 /// Share of the step kept after a failed solution of the implicit equations.
@@ -73,7 +73,7 @@ enum Rejection {
 }
 
 impl Bdf {
-    pub fn new<D: Dynamics + ?Sized>(system: &Augmented<D>, norm: ErrorNorm) -> Self {
+    pub fn new(system: &Augmented, norm: ErrorNorm) -> Self {
         let length = system.length();
         let newton = Newton::new(system);
         let kept = if newton.filters() { 2 * length } else { length };
@@ -123,12 +123,7 @@ impl Bdf {
     }
 
     /// One accepted step that does not pass `end`.
-    pub fn step<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        limits: &Limits,
-        end: f64,
-    ) -> Result<PlannedStep, Refusal> {
+    pub fn step(&mut self, system: &mut Augmented, limits: &Limits, end: f64) -> Result<PlannedStep, Refusal> {
         self.norm.set_weights(&self.history.differences[0][..self.z.len()]);
         let mut error_failures = 0;
         loop {
@@ -158,12 +153,7 @@ impl Bdf {
     }
 
     /// One step of given order to exactly `end`, the implicit equations solved to rounding, without error control.
-    pub fn follow<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        end: f64,
-        order: usize,
-    ) -> Result<(), Refusal> {
+    pub fn follow(&mut self, system: &mut Augmented, end: f64, order: usize) -> Result<(), Refusal> {
         let start = self.history.time;
         self.norm.set_weights(&self.history.differences[0][..self.z.len()]);
         self.history.order = order;
@@ -181,11 +171,7 @@ impl Bdf {
     }
 
     /// Solves for state and sensitivities at the end of the step and judges the error.
-    fn attempt<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        end: f64,
-    ) -> Result<(OrderChoice, Size), Rejection> {
+    fn attempt(&mut self, system: &mut Augmented, end: f64) -> Result<(OrderChoice, Size), Rejection> {
         let n = system.n;
         self.history.predict(&mut self.z, &mut self.z_prime);
         self.correction.fill(0.0);
@@ -212,11 +198,7 @@ impl Bdf {
     }
 
     /// The columns from `dF/dy S + dF/dy' S' + dF/dtheta = 0` with the matrix at the solution of the step.
-    fn solve_sensitivities<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        end: f64,
-    ) -> Result<(), NewtonFailure> {
+    fn solve_sensitivities(&mut self, system: &mut Augmented, end: f64) -> Result<(), NewtonFailure> {
         let (n, p, c) = (system.n, system.p, self.history.leading);
         if p == 0 {
             return Ok(());
@@ -245,7 +227,7 @@ impl Bdf {
     }
 
     /// Size of the correction, which is filtered here; `state_only`: without the sensitivities.
-    fn size_of_correction<D: Dynamics + ?Sized>(&mut self, system: &Augmented<D>, state_only: bool) -> Size {
+    fn size_of_correction(&mut self, system: &Augmented, state_only: bool) -> Size {
         if self.newton.filters() {
             let part = if state_only { system.n } else { self.z.len() };
             let (correction, filtered) = self.correction.split_at_mut(self.z.len());
@@ -256,12 +238,7 @@ impl Bdf {
     }
 
     /// Size of the correction with these differences, each times a factor, added to it.
-    fn size_of_sum<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &Augmented<D>,
-        terms: &[(usize, f64)],
-        state_only: bool,
-    ) -> Size {
+    fn size_of_sum(&mut self, system: &Augmented, terms: &[(usize, f64)], state_only: bool) -> Size {
         if !self.newton.filters() {
             return self.size_of_part(system, terms, 0, state_only);
         }
@@ -278,13 +255,7 @@ impl Bdf {
         }
     }
 
-    fn size_of_part<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &Augmented<D>,
-        terms: &[(usize, f64)],
-        offset: usize,
-        state_only: bool,
-    ) -> Size {
+    fn size_of_part(&mut self, system: &Augmented, terms: &[(usize, f64)], offset: usize, state_only: bool) -> Size {
         let part = if state_only { system.n } else { self.z.len() };
         let range = offset..offset + part;
         let sum = &mut self.scratch[..part];
@@ -297,7 +268,7 @@ impl Bdf {
     }
 
     /// Filters the differences where the matrix has changed since.
-    fn filter_differences<D: Dynamics + ?Sized>(&mut self, system: &Augmented<D>) {
+    fn filter_differences(&mut self, system: &Augmented) {
         let renewals = self.newton.renewals;
         let patience = if system.p == 0 { 1 } else { FILTERED_STEPS };
         let is_recent = self.filtered_at.is_some_and(|last| renewals < last + patience);
@@ -313,12 +284,7 @@ impl Bdf {
     }
 
     /// Whether the order below would have had a smaller error; `size` is the norm of the correction.
-    fn choose_order<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &Augmented<D>,
-        size: f64,
-        state_only: bool,
-    ) -> OrderChoice {
+    fn choose_order(&mut self, system: &Augmented, size: f64, state_only: bool) -> OrderChoice {
         let k = self.history.order;
         let sigma = self.history.sigma;
         let error = sigma[k] * size;
@@ -343,12 +309,7 @@ impl Bdf {
         choice
     }
 
-    fn accept<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        end: f64,
-        choice: OrderChoice,
-    ) -> PlannedStep {
+    fn accept(&mut self, system: &mut Augmented, end: f64, choice: OrderChoice) -> PlannedStep {
         system.work.steps += 1;
         let k = self.history.order;
         let planned = PlannedStep { end, order: k as u8, branches: Branches::Free };
@@ -379,12 +340,7 @@ impl Bdf {
     }
 
     /// Order of the next step and the error to expect of it at the present length.
-    fn next_order<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &Augmented<D>,
-        choice: OrderChoice,
-        order_change: i64,
-    ) -> (usize, f64) {
+    fn next_order(&mut self, system: &Augmented, choice: OrderChoice, order_change: i64) -> (usize, f64) {
         let k = self.history.order;
         if choice.order < k {
             return (choice.order, choice.error);
@@ -406,18 +362,13 @@ impl Bdf {
         }
     }
 
-    fn after_newton_failure<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, failure: NewtonFailure) {
+    fn after_newton_failure(&mut self, system: &mut Augmented, failure: NewtonFailure) {
         system.work.rejected_newton += 1;
         self.trouble = (failure.cause, failure.component);
         self.history.resize(NEWTON_RETREAT * self.history.step);
     }
 
-    fn after_error_failure<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        choice: OrderChoice,
-        failures: usize,
-    ) {
+    fn after_error_failure(&mut self, system: &mut Augmented, choice: OrderChoice, failures: usize) {
         system.work.rejected_error += 1;
         let factor = if failures == 1 {
             let ratio = SAFETY * (2.0 * choice.error + 1e-4).powf(-1.0 / (choice.order + 1) as f64);

@@ -4,7 +4,6 @@
 //! which determine the multipliers (Brenan-Campbell-Petzold-1996, 5.3).
 
 use super::augmented::Augmented;
-use super::problem::Dynamics;
 use super::stepper::first_not_finite;
 use crate::linear::Factorisation;
 
@@ -45,8 +44,8 @@ struct Equations {
 /// Solves `F(t, y, y') = 0` for the derivatives of the differential and the values of the algebraic components, then the
 /// linear equations that their sensitivities satisfy. Differential values and their sensitivities stay; they must
 /// satisfy the constraints. Explicit dependence of constraints on time is differenced over `time_step` from `t` on.
-pub(super) fn make_consistent<D: Dynamics + ?Sized>(
-    system: &mut Augmented<D>,
+pub(super) fn make_consistent(
+    system: &mut Augmented,
     t: f64,
     time_step: f64,
     z: &mut [f64],
@@ -78,7 +77,7 @@ pub(super) fn make_consistent<D: Dynamics + ?Sized>(
 }
 
 impl Point {
-    fn equations<D: Dynamics + ?Sized>(&self, system: &mut Augmented<D>, y: &[f64], y_prime: &[f64]) -> Equations {
+    fn equations(&self, system: &mut Augmented, y: &[f64], y_prime: &[f64]) -> Equations {
         system.linearise(self.t, y, y_prime, 0.0);
         let by_y = system.jacobian.clone();
         // Large against dF/dy, so that the difference keeps its digits.
@@ -96,9 +95,9 @@ impl Point {
         Equations { matrix, by_y }
     }
 
-    fn solve_state<D: Dynamics + ?Sized>(
+    fn solve_state(
         &self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         factorisation: &mut Factorisation,
         y: &mut [f64],
         y_prime: &mut [f64],
@@ -133,7 +132,7 @@ impl Point {
     }
 
     /// Partial derivative of the constraints with respect to time, length n.
-    fn drift<D: Dynamics + ?Sized>(&self, system: &mut Augmented<D>, y: &[f64], y_prime: &[f64]) -> Vec<f64> {
+    fn drift(&self, system: &mut Augmented, y: &[f64], y_prime: &[f64]) -> Vec<f64> {
         let mut drift = vec![0.0; system.n];
         if !system.structure.has_constraints() {
             return drift;
@@ -146,9 +145,9 @@ impl Point {
         drift
     }
 
-    fn solve_sensitivities<D: Dynamics + ?Sized>(
+    fn solve_sensitivities(
         &self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         factorisation: &mut Factorisation,
         z: &mut [f64],
         z_prime: &mut [f64],
@@ -175,9 +174,9 @@ impl Point {
     }
 
     /// In the rows of constraints `-(c_x S + c_theta)` gives way to its derivative along the solution, S held.
-    fn replace_constraint_sensitivities<D: Dynamics + ?Sized>(
+    fn replace_constraint_sensitivities(
         &self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         y: &[f64],
         y_prime: &[f64],
         s: &[f64],
@@ -189,7 +188,7 @@ impl Point {
         let p = system.p;
         let mut slope = vec![0.0; right.len()];
         let mut term = vec![0.0; right.len()];
-        let mut add = |system: &mut Augmented<D>, t: f64, y: &[f64], weight: f64| {
+        let mut add = |system: &mut Augmented, t: f64, y: &[f64], weight: f64| {
             system.held_derivative_right_hand_side(t, y, y_prime, s, &mut term);
             slope.iter_mut().zip(&term).for_each(|(sum, value)| *sum += weight * value);
         };
@@ -213,13 +212,7 @@ impl Point {
 }
 
 /// Puts `c_t + c_x x'` in the rows of constraints.
-fn replace_constraints<D: Dynamics + ?Sized>(
-    system: &Augmented<D>,
-    by_y: &[f64],
-    drift: &[f64],
-    y_prime: &[f64],
-    residual: &mut [f64],
-) {
+fn replace_constraints(system: &Augmented, by_y: &[f64], drift: &[f64], y_prime: &[f64], residual: &mut [f64]) {
     for &row in &system.structure.constraints {
         residual[row] = drift[row];
     }

@@ -49,8 +49,8 @@ pub struct Equilibrium {
 /// equations leave undetermined (free to move without stiffness); [`FailureCause::RedundantConstraints`] naming the
 /// constraints whose forces are undetermined (static redundancy); [`FailureCause::NotFinite`] where the model cannot be
 /// evaluated at the start.
-pub fn equilibrium<D: Dynamics + ?Sized>(
-    dynamics: &mut D,
+pub fn equilibrium(
+    dynamics: &mut dyn Dynamics,
     t: f64,
     y: &[f64],
     sensitivity: &[f64],
@@ -99,8 +99,8 @@ impl Trouble {
 
 type Outcome<T> = Result<T, Trouble>;
 
-struct Search<'d, D: ?Sized> {
-    dynamics: &'d mut D,
+struct Search<'d> {
+    dynamics: &'d mut dyn Dynamics,
     t: f64,
     y: Vec<f64>,
     unknowns: Vec<usize>,
@@ -121,8 +121,8 @@ struct Linearisation {
     row_factor: Vec<f64>,
 }
 
-impl<'d, D: Dynamics + ?Sized> Search<'d, D> {
-    fn new(dynamics: &'d mut D, t: f64, y: &[f64], unknown: &[bool], work: Work) -> Self {
+impl<'d> Search<'d> {
+    fn new(dynamics: &'d mut dyn Dynamics, t: f64, y: &[f64], unknown: &[bool], work: Work) -> Self {
         let n = y.len();
         let unknowns: Vec<usize> = (0..n).filter(|&i| unknown[i]).collect();
         let rows = equations(dynamics, t, y, unknown);
@@ -311,7 +311,7 @@ impl Linearisation {
 }
 
 /// Rows of F that determine the unknown components.
-fn equations<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64], unknown: &[bool]) -> Vec<usize> {
+fn equations(dynamics: &mut dyn Dynamics, t: f64, y: &[f64], unknown: &[bool]) -> Vec<usize> {
     let n = unknown.len();
     let mut values = vec![0.0; dynamics.pattern().len()];
     dynamics.jacobian(t, y, &vec![0.0; n], 0.0, &mut values);

@@ -19,8 +19,8 @@ pub(super) struct Accuracy {
 
 /// State (length n) and its sensitivity (n x p column-major) where all components are unknown and Newton's method runs
 /// straight to a regular solution.
-pub(super) fn solve<D: Dynamics + ?Sized>(
-    dynamics: &mut D,
+pub(super) fn solve(
+    dynamics: &mut dyn Dynamics,
     t: f64,
     y: &[f64],
     accuracy: &Accuracy,
@@ -38,8 +38,8 @@ pub(super) fn solve<D: Dynamics + ?Sized>(
     sensitivity.map(|sensitivity| (newton.y, sensitivity))
 }
 
-struct Newton<'d, D: ?Sized> {
-    dynamics: &'d mut D,
+struct Newton<'d> {
+    dynamics: &'d mut dyn Dynamics,
     t: f64,
     y: Vec<f64>,
     zero: Vec<f64>,
@@ -52,8 +52,8 @@ struct Newton<'d, D: ?Sized> {
     work: Work,
 }
 
-impl<'d, D: Dynamics + ?Sized> Newton<'d, D> {
-    fn new(dynamics: &'d mut D, t: f64, y: &[f64]) -> Self {
+impl<'d> Newton<'d> {
+    fn new(dynamics: &'d mut dyn Dynamics, t: f64, y: &[f64]) -> Self {
         let n = y.len();
         let places: Vec<(usize, usize)> = dynamics.pattern().entries().collect();
         Self {

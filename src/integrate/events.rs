@@ -7,7 +7,7 @@
 
 use super::augmented::Augmented;
 use super::consistent::{Consistency, make_consistent};
-use super::problem::{Dynamics, FailureCause, ResetDerivatives, SwitchDerivatives};
+use super::problem::{FailureCause, ResetDerivatives, SwitchDerivatives};
 use super::stepper::{Refusal, first_not_finite};
 
 /// Points within a step at which signs are compared, besides its end.
@@ -57,7 +57,7 @@ impl Events {
     }
 
     /// Takes the signs at a start; those of zeros from their slopes.
-    pub fn begin<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, t: f64, z: &[f64], y_prime: &[f64]) {
+    pub fn begin(&mut self, system: &mut Augmented, t: f64, z: &[f64], y_prime: &[f64]) {
         system.dynamics.switches(t, &z[..system.n], &mut self.values);
         for k in 0..self.values.len() {
             let zero = self.values[k] == 0.0;
@@ -68,9 +68,9 @@ impl Events {
     }
 
     /// The first event in the step from `from` to `to`.
-    pub fn find<D: Dynamics + ?Sized>(
+    pub fn find(
         &mut self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         from: f64,
         to: f64,
         interpolate: impl Fn(f64, &mut [f64]),
@@ -111,9 +111,9 @@ impl Events {
 
     /// First instant known to lie behind the zero between `left` and `right`, to rounding; bisection and false position in
     /// turn, so that neither flat nor steep functions are slow.
-    fn locate<D: Dynamics + ?Sized>(
+    fn locate(
         &mut self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         switch: usize,
         mut left: f64,
         mut right: f64,
@@ -146,9 +146,9 @@ impl Events {
     }
 
     /// Resets state and sensitivities (`z` holds them just before the event) and takes the new signs.
-    pub fn cross<D: Dynamics + ?Sized>(
+    pub fn cross(
         &mut self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         event: Event,
         time_step: f64,
         z: &mut [f64],
@@ -180,9 +180,9 @@ impl Events {
     }
 
     /// One reset; functions that it makes positive are added to those that have `fired`.
-    fn reset<D: Dynamics + ?Sized>(
+    fn reset(
         &mut self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         (switch, rising): (usize, bool),
         time: f64,
         shift: &[f64],
@@ -206,9 +206,9 @@ impl Events {
     }
 
     /// Functions that a jump has made positive.
-    fn add_fired<D: Dynamics + ?Sized>(
+    fn add_fired(
         &mut self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         time: f64,
         z: &[f64],
         before: &[f64],
@@ -230,13 +230,7 @@ impl Events {
     }
 
     /// Changes of the state where clocks tick; the instant does not depend on the parameters.
-    pub fn tick<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        clocks: &[usize],
-        time: f64,
-        z: &mut [f64],
-    ) -> Result<(), Refusal> {
+    pub fn tick(&mut self, system: &mut Augmented, clocks: &[usize], time: f64, z: &mut [f64]) -> Result<(), Refusal> {
         let n = system.n;
         let mut before = vec![0.0; self.values.len()];
         system.dynamics.switches(time, &z[..n], &mut before);
@@ -260,11 +254,7 @@ impl Events {
     }
 
     /// Events without end in a finite time (a ball that comes to rest by bouncing).
-    fn refuse_accumulation<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &Augmented<D>,
-        Event { time, switch }: Event,
-    ) -> Result<(), Refusal> {
+    fn refuse_accumulation(&mut self, system: &Augmented, Event { time, switch }: Event) -> Result<(), Refusal> {
         let (begin, end) = system.work.span;
         let is_close = time - self.last[switch] <= TOGETHER * (end - begin);
         self.together[switch] = if is_close { self.together[switch] + 1 } else { 0 };
@@ -286,7 +276,7 @@ fn sign(value: f64) -> f64 {
     }
 }
 
-fn derivatives<D: Dynamics + ?Sized>(system: &mut Augmented<D>, switch: usize, t: f64, z: &[f64]) -> SwitchDerivatives {
+fn derivatives(system: &mut Augmented, switch: usize, t: f64, z: &[f64]) -> SwitchDerivatives {
     let mut result = SwitchDerivatives::zero(system.n, system.p);
     system.dynamics.switch_derivatives(switch, t, &z[..system.n], &mut result);
     result
@@ -300,12 +290,7 @@ impl SwitchDerivatives {
 }
 
 /// Derivative of the state at a point, by the equations in force.
-fn slopes<D: Dynamics + ?Sized>(
-    system: &mut Augmented<D>,
-    t: f64,
-    time_step: f64,
-    z: &[f64],
-) -> Result<Vec<f64>, Refusal> {
+fn slopes(system: &mut Augmented, t: f64, time_step: f64, z: &[f64]) -> Result<Vec<f64>, Refusal> {
     let (mut z, mut z_prime) = (z.to_vec(), vec![0.0; z.len()]);
     match make_consistent(system, t, time_step, &mut z, &mut z_prime) {
         Consistency::NotFinite(component) => Err(Refusal::new(t, FailureCause::NotFinite).blaming(Some(component))),
@@ -350,7 +335,7 @@ fn apply(s: &mut [f64], n: usize, reset: &ResetDerivatives, shift: &[f64]) {
     }
 }
 
-fn require_finite<D: Dynamics + ?Sized>(system: &Augmented<D>, time: f64, z: &[f64]) -> Result<(), Refusal> {
+fn require_finite(system: &Augmented, time: f64, z: &[f64]) -> Result<(), Refusal> {
     match first_not_finite(z) {
         Some(place) if place < system.n => Err(Refusal::new(time, FailureCause::NotFinite).blaming(Some(place))),
         Some(place) => {

@@ -2,7 +2,7 @@
 
 use super::augmented::Augmented;
 use super::newton::NewtonFailure;
-use super::problem::{Dynamics, FailureCause};
+use super::problem::FailureCause;
 use super::stepper::first_not_finite;
 use crate::linear::{Factorisation, SingularMatrix};
 
@@ -24,7 +24,7 @@ pub(super) struct IterationMatrix {
 }
 
 impl IterationMatrix {
-    pub fn new<D: Dynamics + ?Sized>(system: &Augmented<D>) -> Self {
+    pub fn new(system: &Augmented) -> Self {
         let expanded = system.dynamics.expanded_pattern();
         Self {
             n: system.n,
@@ -56,9 +56,9 @@ impl IterationMatrix {
         self.has_multipliers
     }
 
-    pub fn renew<D: Dynamics + ?Sized>(
+    pub fn renew(
         &mut self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         (t, y, y_prime): (f64, &[f64], &[f64]),
         leading: f64,
     ) -> Result<(), NewtonFailure> {
@@ -91,7 +91,7 @@ impl IterationMatrix {
         }
     }
 
-    fn failure<D: Dynamics + ?Sized>(&self, system: &Augmented<D>, singular: SingularMatrix) -> NewtonFailure {
+    fn failure(&self, system: &Augmented, singular: SingularMatrix) -> NewtonFailure {
         let of_component = |i: usize| (i < self.n).then_some(i);
         match first_not_finite(&self.values) {
             Some(entry) => {

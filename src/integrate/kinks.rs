@@ -5,7 +5,6 @@
 //! side (Hairer-Norsett-Wanner-1993, II.6).
 
 use super::augmented::Augmented;
-use super::problem::Dynamics;
 use std::sync::Arc;
 
 /// Points within a step at which sides are compared, as shares of it.
@@ -62,7 +61,7 @@ impl Kinks {
     }
 
     /// The sides at a point.
-    pub fn sides<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, t: f64, y: &[f64]) -> Arc<[bool]> {
+    pub fn sides(&mut self, system: &mut Augmented, t: f64, y: &[f64]) -> Arc<[bool]> {
         system.dynamics.kinks(t, y, &mut self.values);
         self.values.iter().map(|value| *value < 0.0).collect()
     }
@@ -104,9 +103,9 @@ impl Kinks {
     }
 
     /// The first change of `sides` in a step of length `h` from `t`; `interpolate` gives the state at a share of the step.
-    pub fn find<D: Dynamics + ?Sized>(
+    pub fn find(
         &mut self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         (t, h): (f64, f64),
         sides: &[bool],
         interpolate: impl Fn(f64, &mut [f64]),
@@ -154,9 +153,9 @@ impl Kinks {
     }
 
     /// The zero of a kink near the end of a step, as a share of it, by a step of Newton's method from the end.
-    pub fn near_end<D: Dynamics + ?Sized>(
+    pub fn near_end(
         &mut self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         (t, h): (f64, f64),
         kink: &Kink,
         interpolate: impl Fn(f64, &mut [f64]),

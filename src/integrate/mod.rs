@@ -45,8 +45,8 @@ use segments::{first_clocks, segments};
 /// # Errors
 ///
 /// A [`Failure`] with time, cause, component to blame and the work so far.
-pub fn integrate<D: Dynamics + ?Sized>(
-    dynamics: &mut D,
+pub fn integrate(
+    dynamics: &mut dyn Dynamics,
     start: &Start,
     times: &[f64],
     breakpoints: &[f64],
@@ -92,7 +92,7 @@ fn without_states(times: &[f64], options: &Options) -> Solution {
     Solution { times: times.to_vec(), work, plan: options.record_plan.then(Plan::default), ..Solution::default() }
 }
 
-fn check<D: Dynamics + ?Sized>(dynamics: &D, start: &Start, times: &[f64], options: &Options) -> Result<(), Failure> {
+fn check(dynamics: &dyn Dynamics, start: &Start, times: &[f64], options: &Options) -> Result<(), Failure> {
     let (n, p) = (dynamics.dimension(), dynamics.parameter_count());
     let positive = |values: &[f64]| values.iter().position(|v| !(*v > 0.0 && v.is_finite()));
     if let Some(component) = positive(dynamics.scale()) {

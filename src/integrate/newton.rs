@@ -3,7 +3,7 @@
 use super::augmented::Augmented;
 use super::iteration_matrix::IterationMatrix;
 use super::norm::ErrorNorm;
-use super::problem::{Dynamics, FailureCause};
+use super::problem::FailureCause;
 use super::stepper::first_not_finite;
 
 const MAXIMUM_ITERATIONS: usize = 4;
@@ -32,7 +32,7 @@ const POLISH_ITERATIONS: usize = 12;
 const POLISHED: f64 = 1e-9;
 
 /// Largest sum of a row of `|f_y| = |c I - J|`, rows and columns in typical magnitudes.
-fn bound_of_eigenvalues<D: Dynamics + ?Sized>(system: &Augmented<D>, c: f64) -> f64 {
+fn bound_of_eigenvalues(system: &Augmented, c: f64) -> f64 {
     let scale = system.dynamics.scale();
     let mut sums = vec![0.0; system.n];
     let places = system.jacobian_rows.iter().zip(&system.jacobian_columns);
@@ -100,7 +100,7 @@ pub(super) struct Newton {
 }
 
 impl Newton {
-    pub fn new<D: Dynamics + ?Sized>(system: &Augmented<D>) -> Self {
+    pub fn new(system: &Augmented) -> Self {
         Self {
             matrix: IterationMatrix::new(system),
             rate_factor: CAUTIOUS_RATE,
@@ -126,7 +126,7 @@ impl Newton {
         })
     }
 
-    fn renew<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, end: &StepEnd) -> Result<(), NewtonFailure> {
+    fn renew(&mut self, system: &mut Augmented, end: &StepEnd) -> Result<(), NewtonFailure> {
         self.matrix.renew(system, (end.time, end.y, end.y_prime), end.leading)?;
         self.renewals += 1;
         self.rate_factor = CAUTIOUS_RATE;
@@ -139,7 +139,7 @@ impl Newton {
         Ok(())
     }
 
-    fn renew_mass<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, end: &StepEnd) {
+    fn renew_mass(&mut self, system: &mut Augmented, end: &StepEnd) {
         self.mass.clone_from(&system.jacobian);
         system.linearise(end.time, end.y, end.y_prime, 0.0);
         self.mass.iter_mut().zip(&mut system.jacobian).for_each(|(both, by_y)| {
@@ -161,7 +161,7 @@ impl Newton {
     /// Replaces an error by what it does to the solution, `J^-1 c dF/dy' e`, where some combinations of differential
     /// components are in fact algebraic. These are found anew in every step, so that their differences say nothing about
     /// errors; they follow the error of the others (Hairer-Wanner-1996, IV.8).
-    pub fn filter<D: Dynamics + ?Sized>(&mut self, system: &Augmented<D>, error: &mut [f64]) {
+    pub fn filter(&mut self, system: &Augmented, error: &mut [f64]) {
         if !self.has_hidden_algebraic {
             return;
         }
@@ -193,12 +193,7 @@ impl Newton {
     }
 
     /// Solves from the prediction in `end` and leaves the solution there.
-    pub fn solve<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        norm: &ErrorNorm,
-        end: &mut StepEnd,
-    ) -> Result<(), NewtonFailure> {
+    pub fn solve(&mut self, system: &mut Augmented, norm: &ErrorNorm, end: &mut StepEnd) -> Result<(), NewtonFailure> {
         let mut new = !self.serves(end.leading);
         if end.leading != self.last_leading {
             self.rate_factor = UNKNOWN_RATE;
@@ -224,12 +219,7 @@ impl Newton {
         }
     }
 
-    fn iterate<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        norm: &ErrorNorm,
-        end: &mut StepEnd,
-    ) -> Result<(), NewtonFailure> {
+    fn iterate(&mut self, system: &mut Augmented, norm: &ErrorNorm, end: &mut StepEnd) -> Result<(), NewtonFailure> {
         let (mut first, mut has_converged) = (0.0, false);
         for iteration in 0..MAXIMUM_ITERATIONS {
             self.find_delta(system, end)?;
@@ -257,11 +247,7 @@ impl Newton {
     }
 
     /// `delta = -J^-1 F`, corrected for a matrix made with another leading coefficient.
-    fn find_delta<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        end: &StepEnd,
-    ) -> Result<(), NewtonFailure> {
+    fn find_delta(&mut self, system: &mut Augmented, end: &StepEnd) -> Result<(), NewtonFailure> {
         system.work.newton_iterations += 1;
         system.residual(end.time, end.y, end.y_prime, &mut self.delta);
         if let Some(component) = first_not_finite(&self.delta) {
@@ -281,12 +267,7 @@ impl Newton {
 
     /// Corrects a solved step until nothing moves, with the matrix at hand, and renews it there: the point at which
     /// sensitivities are exact derivatives of the discrete solution.
-    pub fn settle<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        norm: &ErrorNorm,
-        end: &mut StepEnd,
-    ) -> Result<(), NewtonFailure> {
+    pub fn settle(&mut self, system: &mut Augmented, norm: &ErrorNorm, end: &mut StepEnd) -> Result<(), NewtonFailure> {
         let mut last = f64::INFINITY;
         for _ in 0..SETTLE_ITERATIONS {
             self.find_delta(system, end)?;
@@ -310,11 +291,7 @@ impl Newton {
         Ok(())
     }
 
-    fn renew_and_correct<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        end: &mut StepEnd,
-    ) -> Result<(), NewtonFailure> {
+    fn renew_and_correct(&mut self, system: &mut Augmented, end: &mut StepEnd) -> Result<(), NewtonFailure> {
         self.renew(system, end)?;
         self.find_delta(system, end)?;
         end.correct(&self.delta);
@@ -322,12 +299,7 @@ impl Newton {
     }
 
     /// Solves to rounding with a new matrix in every iteration.
-    pub fn polish<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        norm: &ErrorNorm,
-        end: &mut StepEnd,
-    ) -> Result<(), NewtonFailure> {
+    pub fn polish(&mut self, system: &mut Augmented, norm: &ErrorNorm, end: &mut StepEnd) -> Result<(), NewtonFailure> {
         let mut last = f64::INFINITY;
         for _ in 0..POLISH_ITERATIONS {
             self.renew_and_correct(system, end)?;

@@ -1,7 +1,7 @@
 //! How large an error is, measured by the tolerances.
 
 use super::augmented::Augmented;
-use super::problem::{Dynamics, Options};
+use super::problem::Options;
 
 const GUESS_SHARE: f64 = 0.01;
 /// Keeps the weights of columns that are still zero finite.
@@ -49,7 +49,7 @@ pub(super) struct Size {
 
 impl ErrorNorm {
     /// `p`: number of sensitivity columns under control.
-    pub fn new<D: Dynamics + ?Sized>(system: &Augmented<D>, options: &Options, p: usize) -> Self {
+    pub fn new(system: &Augmented, options: &Options, p: usize) -> Self {
         let dynamics = &*system.dynamics;
         let n = dynamics.dimension();
         let differential = dynamics.differential().to_vec();

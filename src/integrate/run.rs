@@ -34,8 +34,8 @@ impl Method {
     }
 }
 
-pub(super) struct Run<'d, 't, D: ?Sized> {
-    pub system: Augmented<'d, D>,
+pub(super) struct Run<'d, 't> {
+    pub system: Augmented<'d>,
     pub recorder: Recorder<'t>,
     limits: Limits,
     method: Method,
@@ -52,14 +52,14 @@ pub(super) struct Run<'d, 't, D: ?Sized> {
     z_prime: Vec<f64>,
 }
 
-impl<'d, 't, D: Dynamics + ?Sized> Run<'d, 't, D> {
+impl<'d, 't> Run<'d, 't> {
     /// The request must have been checked.
-    pub fn new(dynamics: &'d mut D, start: &Start, times: &'t [f64], options: &Options) -> Self {
+    pub fn new(dynamics: &'d mut dyn Dynamics, start: &Start, times: &'t [f64], options: &Options) -> Self {
         let with_sensitivities = !start.sensitivity.is_empty();
         let mut system = Augmented::new(dynamics, with_sensitivities, start.time, &start.y, &start.y_prime);
         let (n, p) = (system.n, system.p);
         let controlled = if options.control_sensitivities { p } else { 0 };
-        let norm = |system: &Augmented<D>| ErrorNorm::new(system, options, controlled);
+        let norm = |system: &Augmented| ErrorNorm::new(system, options, controlled);
         let mut z = start.y.clone();
         z.extend((0..n).flat_map(|i| (0..p).map(move |j| start.sensitivity[j * n + i])));
         let mut z_prime = vec![0.0; z.len()];

@@ -3,7 +3,7 @@
 use super::augmented::Augmented;
 use super::kinks::Kinks;
 use super::norm::{ErrorNorm, Size};
-use super::problem::{Branches, Dynamics, FailureCause, PlannedStep};
+use super::problem::{Branches, FailureCause, PlannedStep};
 use super::stepper::{Limits, Refusal, first_not_finite};
 use super::{dormand_prince, tsitouras};
 use crate::linear::combine;
@@ -175,9 +175,9 @@ impl RungeKutta {
     }
 
     /// Starts anew at a point, with a first step by Hairer-Norsett-Wanner-1993, II.4.
-    pub fn restart<D: Dynamics + ?Sized>(
+    pub fn restart(
         &mut self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         t: f64,
         z: &[f64],
         limits: &Limits,
@@ -202,7 +202,7 @@ impl RungeKutta {
         Ok(())
     }
 
-    fn first_step<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, span: f64) -> f64 {
+    fn first_step(&mut self, system: &mut Augmented, span: f64) -> f64 {
         let last = self.last();
         let (low, high) = self.stages.split_at_mut(last);
         let (second, first) = (&mut low[1], &mut high[0]);
@@ -225,12 +225,7 @@ impl RungeKutta {
     }
 
     /// One accepted step that does not pass `end`.
-    pub fn step<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        limits: &Limits,
-        end: f64,
-    ) -> Result<PlannedStep, Refusal> {
+    pub fn step(&mut self, system: &mut Augmented, limits: &Limits, end: f64) -> Result<PlannedStep, Refusal> {
         let branches = self.next_branches(system);
         self.begin(system, branches);
         let mut rejected = false;
@@ -301,11 +296,11 @@ impl RungeKutta {
     }
 
     /// Ends the hold of sides.
-    pub fn release_kinks<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) {
+    pub fn release_kinks(&mut self, system: &mut Augmented) {
         self.set_branches(system, Branches::Free);
     }
 
-    fn set_branches<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, branches: Branches) {
+    fn set_branches(&mut self, system: &mut Augmented, branches: Branches) {
         match &branches {
             Branches::Held(sides) => system.dynamics.hold_sides(Some(sides)),
             Branches::Free | Branches::Freed if matches!(self.branches, Branches::Held(_)) => {
@@ -317,9 +312,9 @@ impl RungeKutta {
     }
 
     /// One step to exactly `end`, without error control.
-    pub fn follow<D: Dynamics + ?Sized>(
+    pub fn follow(
         &mut self,
-        system: &mut Augmented<D>,
+        system: &mut Augmented,
         PlannedStep { end, branches, .. }: &PlannedStep,
     ) -> Result<(), Refusal> {
         let end = *end;
@@ -348,7 +343,7 @@ impl RungeKutta {
     }
 
     /// The last stage of a step is the first of the next one, except where the sides of kinks change.
-    fn begin<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, branches: Branches) {
+    fn begin(&mut self, system: &mut Augmented, branches: Branches) {
         let last = self.last();
         self.stages.swap(0, last);
         self.has_dense_stages = false;
@@ -363,7 +358,7 @@ impl RungeKutta {
     }
 
     /// All stages of a step; the new solution is left in `candidate`.
-    fn attempt<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) {
+    fn attempt(&mut self, system: &mut Augmented, h: f64) {
         let last = self.last();
         for stage in 1..=last {
             let (known, new) = self.stages.split_at_mut(stage);
@@ -399,7 +394,7 @@ impl RungeKutta {
         factor.clamp(SMALLEST_FACTOR, largest)
     }
 
-    fn shrink<D: Dynamics + ?Sized>(&mut self, error: Size, system: &Augmented<D>) -> f64 {
+    fn shrink(&mut self, error: Size, system: &Augmented) -> f64 {
         if error.norm.is_finite() {
             self.trouble = (FailureCause::StepTooSmall, Some(error.component));
             (SAFETY * error.norm.powf(-self.pair.exponents().0)).clamp(SMALLEST_FACTOR, 1.0)
@@ -414,7 +409,7 @@ impl RungeKutta {
         first_not_finite(&self.candidate).or(first_not_finite(&self.stages[self.last()]))
     }
 
-    fn accept<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, step: f64, end: f64) {
+    fn accept(&mut self, system: &mut Augmented, step: f64, end: f64) {
         system.work.steps += 1;
         self.near_stability = self.eigenvalue_times_step(system.n, step) > NEAR_STABILITY * self.pair.stability();
         std::mem::swap(&mut self.before, &mut self.current);
@@ -438,7 +433,7 @@ impl RungeKutta {
     }
 
     /// Completes what [`RungeKutta::interpolate`] needs for the last step.
-    pub fn prepare_interpolation<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) {
+    pub fn prepare_interpolation(&mut self, system: &mut Augmented) {
         if self.pair == Pair::Five || self.has_dense_stages {
             return;
         }
@@ -478,10 +473,10 @@ impl RungeKutta {
     }
 }
 
-fn component_of<D: Dynamics + ?Sized>(place: usize, system: &Augmented<D>) -> usize {
+fn component_of(place: usize, system: &Augmented) -> usize {
     if place < system.n { place } else { (place - system.n) / system.p }
 }
 
-fn not_finite<D: Dynamics + ?Sized>(time: f64, place: usize, system: &Augmented<D>) -> Refusal {
+fn not_finite(time: f64, place: usize, system: &Augmented) -> Refusal {
     Refusal::new(time, FailureCause::NotFinite).blaming(Some(component_of(place, system)))
 }

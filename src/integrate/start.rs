@@ -29,8 +29,8 @@ const DIFFERENCE: f64 = 1e-3;
 ///
 /// [`FailureCause::InconsistentStart`] naming the equations that contradict each other or the fixed values,
 /// [`FailureCause::RedundantConstraints`] naming those that repeat each other, [`FailureCause::NotFinite`].
-pub fn consistent_start<D: Dynamics + ?Sized>(
-    dynamics: &mut D,
+pub fn consistent_start(
+    dynamics: &mut dyn Dynamics,
     t: f64,
     y: &[f64],
     sensitivity: &[f64],
@@ -64,7 +64,7 @@ struct Stage {
 
 /// Splits the constraints into those on positions and those on velocities. Components whose rates hold common
 /// multipliers form a class; constraints that touch a single class come first and settle it, the others follow.
-fn stages<D: Dynamics + ?Sized>(system: &mut Augmented<D>, t: f64, y: &[f64], fixed: &[bool]) -> Vec<Stage> {
+fn stages(system: &mut Augmented, t: f64, y: &[f64], fixed: &[bool]) -> Vec<Stage> {
     let n = system.n;
     let by_y = entries(system.dynamics, t, y, &vec![0.0; n]).by_y;
     let structure = &system.structure;
@@ -113,8 +113,8 @@ struct Problem {
     equations: Vec<usize>,
 }
 
-struct Projection<'s, 'd, D: ?Sized> {
-    system: &'s mut Augmented<'d, D>,
+struct Projection<'s, 'd> {
+    system: &'s mut Augmented<'d>,
     t: f64,
     stage: Stage,
     scale: Vec<f64>,
@@ -130,8 +130,8 @@ struct Linearised {
     matrix: Vec<f64>,
 }
 
-impl<'s, 'd, D: Dynamics + ?Sized> Projection<'s, 'd, D> {
-    fn new(system: &'s mut Augmented<'d, D>, t: f64, stage: Stage) -> Self {
+impl<'s, 'd> Projection<'s, 'd> {
+    fn new(system: &'s mut Augmented<'d>, t: f64, stage: Stage) -> Self {
         let scale = system.dynamics.scale().to_vec();
         let zero = vec![0.0; system.n];
         Self { system, t, stage, scale, zero }

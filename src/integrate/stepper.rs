@@ -1,7 +1,7 @@
 //! What both methods have in common.
 
 use super::augmented::Augmented;
-use super::problem::{Dynamics, Failure, FailureCause, Options, Work};
+use super::problem::{Failure, FailureCause, Options, Work};
 
 /// A step smaller than this share of the time cannot be resolved.
 const SMALLEST_STEP: f64 = 16.0 * f64::EPSILON;
@@ -58,9 +58,9 @@ impl Limits {
     }
 
     /// Refuses further attempts once the budget is used up or the step has shrunk to rounding level.
-    pub fn check<D: Dynamics + ?Sized>(
+    pub fn check(
         &self,
-        system: &Augmented<D>,
+        system: &Augmented,
         t: f64,
         step: f64,
         end: f64,

@@ -27,7 +27,7 @@ pub(super) struct Structure {
 }
 
 impl Structure {
-    pub fn new<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64], y_prime: &[f64]) -> Self {
+    pub fn new(dynamics: &mut dyn Dynamics, t: f64, y: &[f64], y_prime: &[f64]) -> Self {
         let n = y.len();
         let mut structure = Self { is_constraint: vec![false; n], is_multiplier: vec![false; n], ..Self::default() };
         let differential = dynamics.differential().to_vec();
@@ -103,7 +103,7 @@ pub(super) struct Entries {
     by_derivative: Vec<(usize, usize, f64)>,
 }
 
-pub(super) fn entries<D: Dynamics + ?Sized>(dynamics: &mut D, t: f64, y: &[f64], y_prime: &[f64]) -> Entries {
+pub(super) fn entries(dynamics: &mut dyn Dynamics, t: f64, y: &[f64], y_prime: &[f64]) -> Entries {
     let shifted: Vec<f64> = y
         .iter()
         .zip(dynamics.scale())

@@ -3,7 +3,6 @@
 use super::{Branches, Pair, RungeKutta};
 use crate::integrate::augmented::Augmented;
 use crate::integrate::kinks::{Kink, Kinks};
-use crate::integrate::problem::Dynamics;
 use crate::integrate::tsitouras;
 use crate::linear::combine;
 use std::sync::Arc;
@@ -50,7 +49,7 @@ pub(super) enum Crossing {
 
 impl RungeKutta {
     /// The branches of the next step: those of the last one unless it ended at a kink or kinks are left to the values.
-    pub(super) fn next_branches<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) -> Branches {
+    pub(super) fn next_branches(&mut self, system: &mut Augmented) -> Branches {
         self.free_steps = self.free_steps.saturating_sub(1);
         if !self.kinks.exist() || self.free_steps > 0 {
             return Branches::Free;
@@ -63,7 +62,7 @@ impl RungeKutta {
     }
 
     /// What kinks do in an attempt of length `h` whose error is small.
-    pub(super) fn crossing<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) -> Crossing {
+    pub(super) fn crossing(&mut self, system: &mut Augmented, h: f64) -> Crossing {
         let Branches::Held(sides) = &self.branches else { return Crossing::None };
         let sides = sides.clone();
         let beyond = self.kinks.sides(system, self.time + h, &self.candidate[..system.n]);
@@ -87,12 +86,7 @@ impl RungeKutta {
     }
 
     /// By which factor an attempt of length `h` should be longer to end at the kink; none if it is close enough.
-    pub(super) fn correction<D: Dynamics + ?Sized>(
-        &mut self,
-        system: &mut Augmented<D>,
-        aim: &mut Aim,
-        h: f64,
-    ) -> Option<f64> {
+    pub(super) fn correction(&mut self, system: &mut Augmented, aim: &mut Aim, h: f64) -> Option<f64> {
         let share = self.with_kinks(|kinks, method| {
             let interpolate = |share: f64, y: &mut [f64]| method.interpolate_attempt(share, h, y);
             kinks.near_end(system, (method.time, h), &aim.kink, interpolate)
@@ -103,7 +97,7 @@ impl RungeKutta {
     }
 
     /// Difference of the right-hand side on the sides held and on those by the values at the end of an attempt, as an error.
-    fn jump<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64, held: &Arc<[bool]>) -> f64 {
+    fn jump(&mut self, system: &mut Augmented, h: f64, held: &Arc<[bool]>) -> f64 {
         self.set_branches(system, Branches::Free);
         system.rates(self.time + h, &self.candidate, &mut self.error);
         self.set_branches(system, Branches::Held(held.clone()));
@@ -113,7 +107,7 @@ impl RungeKutta {
     }
 
     /// Lets values decide on sides for some steps, beginning with the one that is attempted.
-    pub(super) fn free<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>) {
+    pub(super) fn free(&mut self, system: &mut Augmented) {
         self.set_branches(system, Branches::Freed);
         self.free_steps = FREE_STEPS;
         system.rates(self.time, &self.current, &mut self.stages[0]);
@@ -149,7 +143,7 @@ impl RungeKutta {
 
     /// A kink that the next step, of length `h`, will probably cross, located by a step of the state alone: sensitivities follow once
     /// its length is known.
-    pub(super) fn look_ahead<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) -> Option<Aim> {
+    pub(super) fn look_ahead(&mut self, system: &mut Augmented, h: f64) -> Option<Aim> {
         let Branches::Held(sides) = &self.branches else { return None };
         if !self.kinks.expects_crossing(h, sides) {
             return None;
@@ -177,7 +171,7 @@ impl RungeKutta {
     }
 
     /// All stages of a step of the state without its sensitivities.
-    fn attempt_state<D: Dynamics + ?Sized>(&mut self, system: &mut Augmented<D>, h: f64) {
+    fn attempt_state(&mut self, system: &mut Augmented, h: f64) {
         let (n, last) = (system.n, self.last());
         for stage in 1..=last {
             let (known, new) = self.stages.split_at_mut(stage);
