@@ -37,7 +37,14 @@ pub fn consistent_start(
     fixed: &[bool],
 ) -> Result<Start, Failure> {
     let (n, p) = (dynamics.dimension(), dynamics.parameter_count());
-    let fail = |cause, component, equations| Failure { time: t, cause, component, equations, work: Box::default() };
+    let fail = |cause, component, equations| Failure {
+        time: t,
+        cause,
+        component,
+        equations,
+        state: y.to_vec(),
+        work: Box::default(),
+    };
     if y.len() != n || fixed.len() != n || !(sensitivity.is_empty() || sensitivity.len() == n * p) {
         return Err(fail(FailureCause::InvalidRequest, None, Vec::new()));
     }
@@ -63,7 +70,8 @@ struct Stage {
 }
 
 /// Splits the constraints into those on positions and those on velocities. Components whose rates hold common
-/// multipliers form a class; constraints that touch a single class come first and settle it, the others follow.
+/// multipliers form a class; constraints that touch a single class come first and settle it, the others follow. Velocities may have
+/// constraints of their own, those of linear couplings, but of constraints that touch positions, too, positions have more of their own.
 fn stages(system: &mut Augmented, t: f64, y: &[f64], fixed: &[bool]) -> Vec<Stage> {
     let n = system.n;
     let by_y = entries(system.dynamics, t, y, &vec![0.0; n]).by_y;
@@ -82,13 +90,25 @@ fn stages(system: &mut Augmented, t: f64, y: &[f64], fixed: &[bool]) -> Vec<Stag
     let mut first = Stage::default();
     let mut second = Stage::default();
     let mut settled = vec![false; n];
-    for (row, columns) in &touched {
-        let classes: Vec<usize> = columns.iter().map(|&column| find(&mut class, column)).collect();
-        if classes.iter().all(|c| *c == classes[0]) {
-            first.rows.push(*row);
-            classes.iter().for_each(|&c| settled[c] = true);
-        } else {
-            second.rows.push(*row);
+    let mut classes_of = |columns: &[usize]| -> Vec<usize> {
+        let mut classes: Vec<usize> = columns.iter().map(|&column| find(&mut class, column)).collect();
+        classes.sort_unstable();
+        classes.dedup();
+        classes
+    };
+    let classes: Vec<Vec<usize>> = touched.iter().map(|(_, columns)| classes_of(columns)).collect();
+    let own = |c: usize| classes.iter().filter(|classes| classes[..] == [c]).count();
+    let follows = |c: usize| {
+        classes.iter().any(|classes| classes.contains(&c) && classes.iter().any(|&other| own(other) > own(c)))
+    };
+    for ((row, _), classes) in touched.iter().zip(&classes) {
+        match classes[..] {
+            [single] if !follows(single) => {
+                first.rows.push(*row);
+                settled[single] = true;
+            }
+            [] => first.rows.push(*row),
+            _ => second.rows.push(*row),
         }
     }
     let movable = |row: &(usize, Vec<usize>)| row.1.iter().copied().filter(|&i| !fixed[i]).collect::<Vec<usize>>();
