@@ -23,7 +23,7 @@ mod sources;
 pub use codes::{Code, CodeEntry};
 pub use diagnostic::{DataPlace, Diagnostic, Label, LabelRecord, Record, Severity};
 pub use render::render;
-pub use similar::similar_name;
+pub use similar::{similar_name, similar_word};
 pub use sources::{Location, Sources};
 
 /// Byte range in a source file.

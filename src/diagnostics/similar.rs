@@ -13,6 +13,16 @@ pub fn similar_name<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str
     best.map(|(_, candidate)| candidate)
 }
 
+/// As [`similar_name`], else a candidate of the same stem: `couple` for `coupling`.
+pub fn similar_word<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
+    let alike = |candidate: &str| word.chars().zip(candidate.chars()).take_while(|(a, b)| a == b).count();
+    let of_stem = |candidate: &&&str| alike(candidate) >= STEM && 2 * alike(candidate) > candidate.chars().count();
+    similar_name(word, candidates.iter().copied()).or_else(|| candidates.iter().find(of_stem).copied())
+}
+
+/// Letters at least that words of one stem share.
+const STEM: usize = 5;
+
 /// Edits that still count as a slip: one in three letters of the shorter word. A wholly different letter case is no edit.
 fn tolerance(name: &str, candidate: &str) -> usize {
     name.chars().count().min(candidate.chars().count()).div_ceil(3).min(3)
@@ -20,7 +30,7 @@ fn tolerance(name: &str, candidate: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::similar_name;
+    use super::{similar_name, similar_word};
 
     #[test]
     fn slips_are_recognised_and_other_words_are_not() {
@@ -31,5 +41,15 @@ mod tests {
         assert_eq!(similar_name("engine", bodies), None);
         assert_eq!(similar_name("", bodies), None);
         assert_eq!(similar_name("x", []), None);
+    }
+
+    #[test]
+    fn words_of_one_stem_are_recognised() {
+        let keywords = ["force", "coupling", "experiment"];
+        assert_eq!(similar_word("couple", &keywords), Some("coupling"));
+        assert_eq!(similar_word("forse", &keywords), Some("force"));
+        assert_eq!(similar_word("experimental_data", &keywords), Some("experiment"));
+        assert_eq!(similar_word("expert", &keywords), None);
+        assert_eq!(similar_word("cup", &keywords), None);
     }
 }

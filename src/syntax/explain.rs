@@ -57,6 +57,9 @@ struct Context<'a> {
     index: usize,
 }
 
+/// Words that are no names (`reserved` in the grammar).
+const NO_NAMES: [&str; 12] = ["if", "then", "else", "and", "or", "in", "from", "prior", "by", "of", "along", "on"];
+
 impl Context<'_> {
     /// Text of the token so many places from the unexpected one; empty outside of the declaration.
     fn word(&self, places: isize) -> &str {
@@ -300,6 +303,11 @@ impl Context<'_> {
             }
             _ if self.kind(0) == Some(TokenKind::Documentation) => {
                 "`///` describes the declaration below it; remarks start with `//`".to_owned()
+            }
+            _ if NO_NAMES.contains(&found) && expectation(rules).contains("a name") => {
+                format!(
+                    "`{found}` joins parts of declarations and expressions and is no name; choose another, such as `{found}_1`"
+                )
             }
             _ if KEYWORDS.contains(&found) && self.tokens.get(self.index).is_some_and(|token| token.first_on_line) => {
                 format!("is the declaration before `{found}` complete?")

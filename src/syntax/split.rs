@@ -1,7 +1,7 @@
 //! The text split into declarations, so that an error in one does not hide the others.
 
 use super::scan::{Token, TokenKind, partner};
-use crate::diagnostics::{Code, Diagnostic, Span, similar_name};
+use crate::diagnostics::{Code, Diagnostic, Span, similar_word};
 use std::ops::Range;
 
 /// First words of declarations.
@@ -228,7 +228,7 @@ impl Splitter<'_> {
         } else if self.tokens[first].kind == TokenKind::Word {
             let finding = Diagnostic::error(Code::UNKNOWN_KEYWORD, format!("`{word}` does not begin a declaration"))
                 .label(span, "expected a declaration, e.g. `body`, `joint`, `force`, `measure`");
-            match similar_name(word, KEYWORDS).map(str::to_owned).or_else(|| self.keyword_before(first)) {
+            match similar_word(word, &KEYWORDS).map(str::to_owned).or_else(|| self.keyword_before(first)) {
                 Some(declaration) => finding.help(format!("did you mean `{declaration}`?")),
                 None => finding,
             }
