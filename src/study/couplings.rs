@@ -5,7 +5,7 @@ use super::declarations;
 use super::evaluate::Typed;
 use super::model::{Coupling, PointMotion};
 use crate::diagnostics::{Code, Diagnostic, Span};
-use crate::expression::Symbol;
+use crate::expression::{Node, Symbol};
 use crate::quantities::Dimension;
 use crate::syntax::{Expression, ExpressionKind, Name};
 use std::collections::HashSet;
@@ -15,6 +15,10 @@ const SCOPE: Scope = Scope::Study(Allowed::Motion);
 /// What holds an equation between quantities of a dimension: power over its rate.
 pub(super) fn load_dimension(of: Dimension) -> Dimension {
     Dimension::TORQUE / of
+}
+
+fn is_rate(name: &str) -> bool {
+    name.contains("velocity") || name.ends_with(".rate")
 }
 
 fn load_word(of: Dimension) -> &'static str {
@@ -71,7 +75,8 @@ impl<'a> Checker<'a> {
             for symbol in self.graph.symbols_of(&[value.node]) {
                 is_moving |= positions.contains(&symbol);
                 if !positions.contains(&symbol) && symbol != self.time && !self.is_parameter(symbol) {
-                    return self.not_a_position(name, symbol, side.span);
+                    let rolls = !self.is_integrable([a.node, b.node], &positions);
+                    return self.not_a_position(name, symbol, side.span, rolls);
                 }
             }
         }
@@ -98,13 +103,36 @@ impl<'a> Checker<'a> {
         axes.chain(modes).chain(points.map(|quantity| quantity.symbol)).chain(elongations).collect()
     }
 
-    fn not_a_position<T>(&mut self, name: &Name, symbol: Symbol, side: Span) -> Option<T> {
+    /// Whether an equation between rates is that of positions, derived: no rate is multiplied by anything that moves.
+    fn is_integrable(&mut self, sides: [Node; 2], positions: &HashSet<Symbol>) -> bool {
+        let symbols = self.graph.symbols_of(&sides);
+        let rates: Vec<Symbol> =
+            symbols.iter().copied().filter(|symbol| is_rate(self.graph.symbol_name(*symbol))).collect();
+        rates.iter().all(|&rate| {
+            let is_of_joint = !self.graph.symbol_name(rate).contains("angular_velocity");
+            let slopes = self.graph.differentiate(&sides, rate);
+            let in_slopes = self.graph.symbols_of(&slopes);
+            is_of_joint && in_slopes.iter().all(|symbol| !positions.contains(symbol) && !rates.contains(symbol))
+        })
+    }
+
+    fn not_a_position<T>(&mut self, name: &Name, symbol: Symbol, side: Span, rolls: bool) -> Option<T> {
         let foreign = self.graph.symbol_name(symbol).to_owned();
         let mut diagnostic =
             Diagnostic::error(Code::COUPLING, format!("coupling `{}` depends on `{foreign}`", name.text))
                 .label(side, "a coupling relates positions only");
-        if foreign.contains(".velocity") {
-            diagnostic = diagnostic.help("write the relation of the positions; that of the velocities follows from it");
+        if is_rate(&foreign) && rolls {
+            diagnostic = diagnostic
+                .note("no relation of the positions has this one as its rate: what rolls in a plane reaches every position")
+                .help(
+                    "let a force hold the rates together, as friction does: `signal slip = ..` of the difference, `force grip: \
+                     external_load on .. { value = -grip_damping * slip }`; that is creep, which a large `grip_damping` makes small",
+                );
+        } else if is_rate(&foreign) {
+            diagnostic = diagnostic.help(
+                "write `.position` for every `.velocity`, and a constant rate as `rate * t`; the relation of the rates follows from \
+                 that of the positions",
+            );
         } else {
             diagnostic = diagnostic
                 .help("what depends on loads and states is a force element between bodies or on a joint, with its law");

@@ -217,8 +217,7 @@ impl<'a> Checker<'a> {
             diagnostic = diagnostic.help("between bodies write `A -> B`");
         }
         if matches!(entity, Some(Entity::Coupling(_))) {
-            diagnostic =
-                diagnostic.help("let it act on one of the coupled joints; a coupling itself does not give way");
+            diagnostic = diagnostic.help(on_coupling(&name.text));
         }
         if entity.is_none() { self.fail_unknown(&name.text, diagnostic, SCOPE) } else { self.fail(diagnostic, SCOPE) }
     }
@@ -355,7 +354,13 @@ impl<'a> Checker<'a> {
                 let message = format!("an effect cannot act on `{}`", name.text);
                 let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
                     .label(name.span, "not a place for effects")
-                    .help("effects act on moving joints, forces, actuators, inputs, measures, signals and `gravity.x`");
+                    .help(match entity {
+                        Entity::Coupling(_) => on_coupling(&name.text),
+                        _ => {
+                            "effects act on moving joints, forces, actuators, inputs, measures, signals and `gravity.x`"
+                                .to_owned()
+                        }
+                    });
                 return self.fail(diagnostic, SCOPE);
             }
         };
@@ -514,4 +519,13 @@ impl<'a> Checker<'a> {
             }
         })
     }
+}
+
+/// What to write instead of an element on a coupling.
+fn on_coupling(name: &str) -> String {
+    format!(
+        "friction acts on one of the coupled joints, `on motor`, if need be with what the coupling transmits: `{{ transmitted = \
+         {name}.torque }}`; play and elasticity need a body between: `joint play: revolute(z) gear -> wheel`, the coupling to the joint \
+         of `gear`, and `force teeth: backlash on play {{ .. }}`"
+    )
 }
