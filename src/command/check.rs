@@ -22,7 +22,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     let session = Session::open(&arguments.study, arguments.format)?;
     let first = arguments.variant.as_deref().unwrap_or("base");
     let compiled = session.compile(first)?;
-    session.show(&compiled.system.warnings);
     if arguments.variant.is_none() {
         for variant in &compiled.study.variants {
             session.compile(variant)?;

@@ -6,7 +6,6 @@ use super::session::Session;
 use super::{Failed, Format, StudyArguments};
 use crate::diagnose::{Answer, Options, diagnose};
 use crate::report;
-use crate::simulation::fast_turning;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args, Debug)]
@@ -33,10 +32,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     let session = Session::open(&study.study, study.format)?;
     let checked = session.check(&study.variant)?;
     let records = session.records(&checked, study)?;
-    if checked.bodies.iter().any(|body| body.elastic.is_some()) {
+    let is_elastic = checked.bodies.iter().any(|body| body.elastic.is_some());
+    if is_elastic || !checked.couplings.is_empty() || checked.joints.iter().any(|joint| joint.closes_loop) {
         let compiled = session.compile(&study.variant)?;
         let start: Vec<f64> = checked.parameters.iter().map(|parameter| parameter.start).collect();
-        records.iter().for_each(|record| session.show(&fast_turning(&compiled, record, &start)));
+        session.caution(&compiled, &records, &start);
     }
     let display = Display::new(study.quiet);
     let options = Options { variant: study.variant.clone(), maximum_extensions: arguments.extensions };

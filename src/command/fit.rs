@@ -7,7 +7,7 @@ use crate::analyse::{Cuts, cuts};
 use crate::fit::{Chosen, Control, Optimiser};
 use crate::identify::{Fitted, Profile, Settings, confidence, equation_error, fit, identification, profiles};
 use crate::report;
-use crate::simulation::{Compiled, Record, fast_turning};
+use crate::simulation::{Compiled, Record};
 use crate::study::{ErrorDefinition, Role};
 use clap::ValueEnum;
 use std::path::PathBuf;
@@ -234,7 +234,7 @@ pub(super) fn fit_variant(
         Control::Continue
     })
     .map_err(|diagnostic| session.fail(&[diagnostic]))?;
-    records.iter().for_each(|record| session.show(&fast_turning(&compiled, record, &fitted.theta)));
+    session.caution(&compiled, &records, &fitted.theta);
     Ok(FittedVariant { compiled, records, fitted })
 }
 

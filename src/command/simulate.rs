@@ -4,7 +4,7 @@ use super::output::{json, show, write_whole};
 use super::session::Session;
 use super::{Failed, Format, StudyArguments};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::simulation::{Compiled, Gradient, Record, Trajectory, fast_turning, manoeuvre, simulate, slowness};
+use crate::simulation::{Compiled, Record, Trajectory, cautions_about, manoeuvre, probe, slowness};
 use std::path::PathBuf;
 
 #[derive(clap::Args, Debug)]
@@ -37,11 +37,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     }));
     let mut trajectories = Vec::new();
     for record in &records {
-        let trajectory = simulate(&compiled, record, &theta, Gradient::None).map_err(|failure| {
+        let trajectory = probe(&compiled, record, &theta).map_err(|failure| {
             let diagnostic = Diagnostic::error(Code::SIMULATION_FAILED, failure.to_string()).help(&failure.help);
             session.fail(&[diagnostic])
         })?;
-        session.show(&fast_turning(&compiled, record, &theta));
+        session.show(&cautions_about(&compiled, record, &trajectory));
         trajectories.push((record, trajectory));
     }
     if arguments.why_slow {

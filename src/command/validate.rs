@@ -7,7 +7,7 @@ use super::{Failed, StudyArguments};
 use crate::analyse::{MonteCarlo, Verdict, validity};
 use crate::identify::confidence;
 use crate::report;
-use crate::simulation::{fast_turning, manoeuvre};
+use crate::simulation::{Record, manoeuvre};
 use std::path::PathBuf;
 
 #[derive(clap::Args, Debug)]
@@ -39,10 +39,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
         return Err(Failed);
     }
     let fit = fit_variant(&session, study, &study.variant, &arguments.search)?;
-    for index in 0..fit.compiled.study.manoeuvres.len() {
-        let record = manoeuvre(&fit.compiled.study, index);
-        session.show(&fast_turning(&fit.compiled, &record, &fit.fitted.theta));
-    }
+    let used: Vec<Record> =
+        (0..fit.compiled.study.manoeuvres.len()).map(|index| manoeuvre(&fit.compiled.study, index)).collect();
+    session.caution(&fit.compiled, &used, &fit.fitted.theta);
     let confidence = confidence(&fit.compiled, &fit.fitted);
     let options = MonteCarlo { samples: arguments.samples, seed: arguments.seed };
     let result = validity(&fit.compiled, &fit.fitted, &confidence, options);

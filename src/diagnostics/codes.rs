@@ -460,6 +460,15 @@ codes! {
      \x20   for i in 1 .. 16 { joint bend[i]: revolute(z) link[i].tip -> link[i + 1] }\n\
      \x20   for i in 1 .. 16 { force bending[i]: spring on bend[i] { stiffness = 320 N*m/rad } }\n"
 
+    LOOP_BRANCHES "E0317" "loop could go on in two ways"
+    "A parallelogram that stretches out flat can leave that position as a parallelogram or crossed, a crank as long as its rod can\n\
+     turn on or stay on its other side: the constraints of the loop depend on each other there, and hold nothing back. The simulation\n\
+     passes the position with the speed that it has; the machine may do otherwise. At the start itself nothing but the start values\n\
+     of the other joints decides.\n\
+     Let the model decide as the machine does:\n\
+     \n\
+     \x20   coupling same: crank_1.position = crank_2.position\n"
+
     // ---- E04xx: data files and signals ----
 
     DATA_FILE_UNREADABLE "E0401" "data file cannot be read"

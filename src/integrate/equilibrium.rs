@@ -82,7 +82,7 @@ pub fn equilibrium(
 
 fn fail(time: f64, trouble: Trouble, work: Work) -> Failure {
     let Trouble { cause, component, equations } = trouble;
-    Failure { time, cause, component, equations, work: Box::new(work) }
+    Failure { time, cause, component, equations, state: Vec::new(), work: Box::new(work) }
 }
 
 struct Trouble {

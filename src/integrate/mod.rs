@@ -69,7 +69,7 @@ pub fn integrate(
         .take_start(segments.first().map_or(start.time, |segment| segment.end))
         .and_then(|()| run.tick(&first_clocks(start.time, &periods)));
     if let Err(refusal) = outcome {
-        return Err(refusal.with_work(run.system.work));
+        return Err(refusal.with_work(run.state(), run.system.work));
     }
     for segment in segments {
         let (end, discontinuous) = (segment.end, segment.discontinuous);
@@ -79,7 +79,7 @@ pub fn integrate(
         };
         run.release_kinks();
         if let Err(refusal) = outcome.and_then(|()| run.tick(&segment.clocks)) {
-            return Err(refusal.with_work(run.system.work));
+            return Err(refusal.with_work(run.state(), run.system.work));
         }
     }
     Ok(run.recorder.finish(run.system.work))
@@ -126,5 +126,12 @@ fn check(dynamics: &dyn Dynamics, start: &Start, times: &[f64], options: &Option
 }
 
 fn invalid(time: f64, component: Option<usize>) -> Failure {
-    Failure { time, cause: FailureCause::InvalidRequest, component, equations: Vec::new(), work: Box::default() }
+    Failure {
+        time,
+        cause: FailureCause::InvalidRequest,
+        component,
+        equations: Vec::new(),
+        state: Vec::new(),
+        work: Box::default(),
+    }
 }

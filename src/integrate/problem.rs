@@ -345,6 +345,8 @@ pub struct Failure {
     pub component: Option<usize>,
     /// The equations (rows of F) that contradict or repeat each other, where the cause is such.
     pub equations: Vec<usize>,
+    /// The last state reached, length n; empty where the integration could not begin.
+    pub state: Vec<f64>,
     pub work: Box<Work>,
 }
 

@@ -97,6 +97,16 @@ impl<'d, 't> Run<'d, 't> {
         self.method == Method::Bdf || self.system.explicit
     }
 
+    /// The last state reached, length n.
+    pub fn state(&self) -> Vec<f64> {
+        let solution = match self.method {
+            _ if self.system.work.steps == 0 => &self.z[..],
+            Method::Explicit => self.runge_kutta.solution(),
+            Method::Bdf => self.bdf.solution(),
+        };
+        solution[..self.system.n].to_vec()
+    }
+
     /// Completes the start for an integration to `end` and takes the requested times at the start itself.
     ///
     /// # Errors

@@ -28,9 +28,10 @@ impl Refusal {
         Self { component, ..self }
     }
 
-    pub fn with_work(self, work: Work) -> Failure {
+    pub fn with_work(self, state: Vec<f64>, work: Work) -> Failure {
         let equations = self.equation.into_iter().collect();
-        Failure { time: self.time, cause: self.cause, component: self.component, equations, work: Box::new(work) }
+        let (time, cause, component) = (self.time, self.cause, self.component);
+        Failure { time, cause, component, equations, state, work: Box::new(work) }
     }
 }
 

@@ -56,7 +56,7 @@ pub(super) fn assemble(
     probes.extend(turning(&mut graph, study, tree, frames));
     let mut events = events(&mut graph, study, &states, meaning, changes);
     events.extend(loops.choices.iter().filter_map(|choice| change_over(&states, choice)));
-    let starts = all_starts(&mut graph, study, &states, meaning, &loops)?;
+    let (starts, references) = all_starts(&mut graph, study, &states, meaning, &loops)?;
     let (algebraic, constraints, constraint_names) = algebraic_part(&mut graph, study, &loops, &reactions);
 
     let system = System {
@@ -68,6 +68,7 @@ pub(super) fn assemble(
         constraints,
         constraint_names,
         loop_constraints: loops.multipliers.len(),
+        loop_owners: loops.owners(study),
         warnings: loops.warnings,
         parameters: study.parameters.iter().map(|p| p.symbol).collect(),
         parameter_names: study.parameters.iter().map(|p| p.name.clone()).collect(),
@@ -75,6 +76,7 @@ pub(super) fn assemble(
         events,
         probes,
         starts,
+        references,
     };
     refuse_unknown_symbols(study, tree, &system)?;
     Ok(system)
@@ -241,11 +243,12 @@ fn all_starts(
     states: &[Variable],
     meaning: &HashMap<Symbol, Node>,
     loops: &Loops,
-) -> Result<Vec<Vec<StartEquation>>, Vec<Diagnostic>> {
+) -> Result<(Vec<Vec<StartEquation>>, Vec<Vec<f64>>), Vec<Diagnostic>> {
     let initial: Vec<Node> = study.states.iter().map(|state| state.initial).collect();
     let initial = graph.substitute(&initial, meaning);
     let initial: HashMap<Symbol, Node> = study.states.iter().map(|state| state.symbol).zip(initial).collect();
     let mut result = Vec::new();
+    let mut references = Vec::new();
     let mut errors = Vec::new();
     for (number, (name, start, span)) in study.starts().enumerate() {
         let mut states = states.to_vec();
@@ -254,6 +257,7 @@ fn all_starts(
                 .iter_mut()
                 .for_each(|state| state.reference = closed.get(&state.symbol).copied().unwrap_or(state.reference));
         }
+        references.push(states.iter().map(|state| state.reference).collect());
         let values: Vec<Node> = start.overrides.iter().map(|&(_, value)| value).collect();
         let values = graph.substitute(&values, meaning);
         // No balance determines states that change at events only.
@@ -270,7 +274,7 @@ fn all_starts(
             Err(found) => errors.extend(found),
         }
     }
-    if errors.is_empty() { Ok(result) } else { Err(errors) }
+    if errors.is_empty() { Ok((result, references)) } else { Err(errors) }
 }
 
 /// Everything that is left must be time, a state or a parameter.

@@ -7,7 +7,7 @@ use super::topology::Tree;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::Dimension;
-use crate::study::{JointKind, Start, Study};
+use crate::study::{AxisMotion, Joint, JointAxis, JointKind, Start, Study};
 use std::collections::HashMap;
 
 /// What was found out about the constraints.
@@ -63,7 +63,9 @@ pub(super) fn assemble_loops(
             positions.push(closed.clone());
             continue;
         }
-        let closed = linkage.assembled(&given).map_err(|residual| vec![not_closed(study, rows, &residual)])?;
+        let order: Vec<Symbol> =
+            start.overrides.iter().map(|&(symbol, _)| symbol).filter(|s| given.contains_key(s)).collect();
+        let closed = linkage.assembled(&given, &order).map_err(|residual| vec![not_closed(study, rows, &residual)])?;
         if let Some(other) = linkage.other_position(&given, &closed)
             && warnings.is_empty()
         {
@@ -85,8 +87,8 @@ pub(super) fn assemble_loops(
     {
         return Err(vec![contradicted(study, &rows[row])]);
     }
-    warnings.extend(redundancies(study, rows, &kept));
     let groups = changing(&mut linkage, is_driven, &kept, &jacobian, (&general, &positions));
+    warnings.extend(redundancies(study, rows, &kept, &groups));
     Ok(Assembly { warnings, kept, positions, general, groups })
 }
 
@@ -240,8 +242,10 @@ fn cannot_move(study: &Study, rows: &[Row]) -> Diagnostic {
     diagnostic.help("remove a joint, replace it by one with more freedom, or prescribe a motion")
 }
 
-/// One warning per joint with redundant constraints, with the joint that would do without them.
-fn redundancies(study: &Study, rows: &[Row], kept: &[usize]) -> Vec<Diagnostic> {
+/// One warning per joint with redundant constraints, with the joint that would do without them; one per coupling that says nothing
+/// new anywhere.
+fn redundancies(study: &Study, rows: &[Row], kept: &[usize], groups: &[Group]) -> Vec<Diagnostic> {
+    let takes_turns = |row: &usize| groups.iter().any(|group| group.sets.iter().any(|set| set.contains(row)));
     let mut warnings = Vec::new();
     let mut owners: Vec<Owner> = rows.iter().map(|row| row.owner).collect();
     owners.dedup();
@@ -252,6 +256,10 @@ fn redundancies(study: &Study, rows: &[Row], kept: &[usize]) -> Vec<Diagnostic> 
             continue;
         }
         let Owner::Joint(index) = owner else {
+            // Where other constraints fail it decides: a parallelogram passes its flat position by the coupling of its cranks.
+            if dropped.iter().any(takes_turns) {
+                continue;
+            }
             let name = owner.name(study);
             let message = format!("coupling `{name}` says what joints and other couplings say already");
             let warning = Diagnostic::warning(Code::REDUNDANT_CONSTRAINT, message)
@@ -268,7 +276,7 @@ fn redundancies(study: &Study, rows: &[Row], kept: &[usize]) -> Vec<Diagnostic> 
         let count = |is_turn: bool| {
             own().filter(|i| kept.contains(i) && matches!(rows[*i].direction, Direction::Turn(_)) == is_turn).count()
         };
-        let cure = cure(joint.kind, &joint.name, (count(false), count(true)), &dropped, rows);
+        let cure = cure(joint, (count(false), count(true)), &dropped, rows);
         let mut warning = Diagnostic::warning(Code::REDUNDANT_CONSTRAINT, message)
             .label(joint.span, "closes the loop; redundant")
             .note("the motion is the same without; reactions in these directions are undetermined and shown as zero");
@@ -281,26 +289,23 @@ fn redundancies(study: &Study, rows: &[Row], kept: &[usize]) -> Vec<Diagnostic> 
 }
 
 /// The edit after which the joint holds only what is needed.
-fn cure(
-    kind: JointKind,
-    name: &str,
-    (shifts, turns): (usize, usize),
-    dropped: &[usize],
-    rows: &[Row],
-) -> Option<String> {
-    let free: Vec<String> = dropped
-        .iter()
-        .filter_map(|&i| match rows[i].direction {
-            Direction::Shift(axis) => Some(format!("shift {}", super::emit::axis_in_list(axis))),
-            _ => None,
-        })
-        .collect();
+fn cure(joint: &Joint, (shifts, turns): (usize, usize), dropped: &[usize], rows: &[Row]) -> Option<String> {
+    let name = &joint.name;
+    let is_shift = |axis: &&JointAxis| matches!(axis.motion, AxisMotion::Shift(_));
+    let turns_first = joint.axes.iter().skip_while(is_shift).any(|axis| is_shift(&axis));
+    let in_list = |axis: [f64; 3]| format!("shift {}", super::emit::axis_in_list(axis));
+    let kept = joint.axes.iter().filter(is_shift).map(|axis| in_list(axis.motion.direction()));
+    let let_go = dropped.iter().filter_map(|&i| match rows[i].direction {
+        Direction::Shift(axis) => Some(in_list(axis)),
+        _ => None,
+    });
+    let free: Vec<String> = kept.chain(let_go).collect();
     match (shifts, turns) {
-        (3, 0) if kind != JointKind::Spherical => {
+        (3, 0) if joint.kind != JointKind::Spherical => {
             Some(format!("replace it by a spherical joint: `joint {name}: spherical ..`"))
         }
         (0, 0) => Some(format!("remove joint `{name}`: it holds nothing that the others do not hold")),
-        (_, 0) if !free.is_empty() => Some(format!(
+        (_, 0) if !free.is_empty() && !turns_first => Some(format!(
             "replace it: `joint {name}: axes({}, turn x, turn y, turn z) ..` holds only what is needed",
             free.join(", ")
         )),

@@ -152,29 +152,50 @@ impl Linkage {
 
     /// Positions at which the loops are closed: near those given, which stay where that is possible; else from elsewhere.
     /// The residual near the start otherwise.
-    pub fn assembled(&mut self, given: &HashMap<Symbol, f64>) -> Result<HashMap<Symbol, f64>, Vec<f64>> {
+    /// Where they state more than the loops leave free, the first of them in `order` are kept.
+    pub fn assembled(
+        &mut self,
+        given: &HashMap<Symbol, f64>,
+        order: &[Symbol],
+    ) -> Result<HashMap<Symbol, f64>, Vec<f64>> {
         let drawn = self.values.clone();
         self.values.extend(given);
         self.normalise();
         let start = self.values.clone();
-        let is_unstated = |freedom: &Freedom| !freedom.is_elastic && !freedom.change.touches(given);
-        let unstated: Vec<usize> = (0..self.freedoms.len()).filter(|&i| is_unstated(&self.freedoms[i])).collect();
         let all: Vec<usize> = (0..self.freedoms.len()).collect();
-        let mut outcome = self.close(&unstated);
-        if outcome.is_err() {
-            self.values = start.clone();
-            outcome = self.close(&all);
-        }
+        let without = |kept: &[Symbol]| -> Vec<usize> {
+            let kept: HashMap<Symbol, f64> = kept.iter().map(|&symbol| (symbol, 0.0)).collect();
+            let moves = |i: &usize| !self.freedoms[*i].is_elastic && !self.freedoms[*i].change.touches(&kept);
+            all.iter().copied().filter(moves).collect()
+        };
+        let unstated = without(order);
+        let mut moved: Vec<Vec<usize>> = (0..=order.len()).rev().map(|count| without(&order[..count])).collect();
+        moved.push(all);
+        moved.dedup();
+        let mut outcome = self.close_by(&start, &moved);
         for attempt in 0..ATTEMPTS {
             let Err(residual) = &outcome else { break };
             let reach = residual.iter().fold(0.0_f64, |m, v| m.max(v.abs())).clamp(0.1, 10.0);
             self.values = start.clone();
             self.move_far(&unstated, attempt, reach);
-            let again = self.close(&unstated).or_else(|_| self.close(&all));
-            outcome = again.map_err(|_| residual.clone());
+            let from = self.values.clone();
+            outcome = self.close_by(&from, &moved).map_err(|_| residual.clone());
         }
         let closed = std::mem::replace(&mut self.values, drawn);
         outcome.map(|()| closed)
+    }
+
+    /// Closes the loops from one position by the first of these sets of coordinates that can. The residual of the last one otherwise.
+    fn close_by(&mut self, from: &HashMap<Symbol, f64>, sets: &[Vec<usize>]) -> Result<(), Vec<f64>> {
+        let mut outcome = Err(Vec::new());
+        for moved in sets {
+            self.values = from.clone();
+            outcome = self.close(moved);
+            if outcome.is_ok() {
+                break;
+            }
+        }
+        outcome
     }
 
     /// A closed position near another that is not special, and the Jacobian of the constraints there: m x n, column-major.

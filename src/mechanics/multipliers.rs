@@ -7,9 +7,9 @@ use super::kinematics::{self, FrameMotion};
 use super::loops::{self, Direction, Owner, Row};
 use super::scale::typical_magnitude;
 use super::selection::{Choice, is_in_force};
-use super::system::{Variable, VariableKind};
+use super::system::{IN_FORCE, Variable, VariableKind};
 use super::topology::{Coordinate, Tree};
-use crate::diagnostics::Diagnostic;
+use crate::diagnostics::{Diagnostic, Span};
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::Dimension;
 use crate::study::{ReactionQuantity, Study};
@@ -76,6 +76,12 @@ impl Loops {
             general: assembly.general,
             warnings: assembly.warnings,
         })
+    }
+
+    /// Per constraint what it belongs to.
+    pub fn owners(&self, study: &Study) -> Vec<(String, Span)> {
+        let owner = |row: &usize| self.rows[*row].owner;
+        self.labels.iter().map(owner).map(|owner| (owner.name(study).to_owned(), owner.span(study))).collect()
     }
 
     /// The rows with what acts along each.
@@ -164,7 +170,7 @@ impl Taken {
         let mut choices = Vec::new();
         for group in &assembly.groups {
             let owner = rows[group.sets[0][0]].owner.name(study);
-            let symbol = graph.symbol(&format!("{owner}.constraints_in_force"));
+            let symbol = graph.symbol(&format!("{owner}.{IN_FORCE}"));
             let in_force: Vec<Node> = (0..group.sets.len()).map(|number| is_in_force(graph, symbol, number)).collect();
             for (at, &row) in group.sets[0].iter().enumerate() {
                 if group.sets.iter().all(|set| set[at] == row) {

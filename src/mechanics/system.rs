@@ -1,6 +1,6 @@
 //! The equations of a study.
 
-use crate::diagnostics::Diagnostic;
+use crate::diagnostics::{Diagnostic, Span};
 use crate::expression::{Graph, Node, Symbol};
 use crate::quantities::Dimension;
 use crate::study::EventTrigger;
@@ -9,6 +9,10 @@ use std::collections::HashMap;
 /// Name of the probe of an elastic body, behind that of the body: squared ratio of its angular velocity and its lowest circular
 /// frequency.
 pub const TURNING: &str = "turning";
+
+/// Name of the state that says which constraints of a loop are in force where several sets of them take turns, behind that of their
+/// joint.
+pub const IN_FORCE: &str = "constraints_in_force";
 
 /// `x' = rates(t, x, w, theta)`, `0 = constraints(t, x, w, theta)`, `y = outputs(t, x, w, theta)`.
 ///
@@ -31,6 +35,8 @@ pub struct System {
     pub constraint_names: Vec<String>,
     /// Number of constraints that closed loops leave, each with one multiplier on either level.
     pub loop_constraints: usize,
+    /// Per such constraint the joint or coupling that it belongs to, with its place.
+    pub loop_owners: Vec<(String, Span)>,
     /// What was found on the way and changes nothing: redundant constraints.
     pub warnings: Vec<Diagnostic>,
     pub parameters: Vec<Symbol>,
@@ -44,6 +50,8 @@ pub struct System {
     pub probes: Vec<Output>,
     /// Per experiment, then per manoeuvre: start value of each state as far as given (see [`StartEquation`]), in state order.
     pub starts: Vec<Vec<StartEquation>>,
+    /// Likewise a position near the start in which the loops are closed, SI.
+    pub references: Vec<Vec<f64>>,
 }
 
 #[derive(Clone, Debug)]

@@ -166,6 +166,7 @@ mod tests {
             channels: vec![vec![5.0, 6.0], vec![1.0, 1.0]],
             gradient: vec![vec![1.0, 2.0, 3.0, 4.0], vec![0.0; 4]],
             probes: Vec::new(),
+            branchings: Vec::new(),
             work: crate::integrate::Work::default(),
         };
         let ours = directional(&trajectory, &[1.0, -1.0]);

@@ -87,7 +87,9 @@ impl Failure {
             }
             Cause::RedundantConstraints => (
                 "constraints repeat each other, so that the forces in them are not determined",
-                "a loop is closed by more joints than it needs: free one of their directions, or make a body elastic",
+                "this is a position in which the loop could go on in two ways, such as a parallelogram stretched out flat: start \
+                 beside it, `start = rest { crank.position = 10 deg }`, or let a coupling decide, `coupling same: \
+                 crank_1.position = crank_2.position`",
             ),
             Cause::NoEquilibrium => (
                 "no equilibrium was found",

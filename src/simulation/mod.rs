@@ -4,6 +4,8 @@
 //! samples, or a [`Failure`] in the study's words. *Must not happen here*: comparison with the measurement, decisions
 //! about parameters.
 
+mod branching;
+mod cautions;
 mod certificate;
 mod delay;
 mod failure;
@@ -12,11 +14,13 @@ mod involved;
 mod manoeuvre;
 mod prepare;
 mod run;
+mod singular_joint;
 mod slowness;
 mod stretch;
 mod tangent;
-mod turning;
 
+pub use branching::Branching;
+pub use cautions::{cautions, cautions_about, needs_caution};
 pub use certificate::certify;
 pub use failure::{Detail, Failure};
 pub use inputs::RecordInputs;
@@ -25,4 +29,3 @@ pub use prepare::{Record, prepare};
 pub use run::{Compiled, Gradient, Trajectory, probe, simulate, slowness};
 pub use slowness::{Limit, Slowness};
 pub use stretch::{Observation, State, Stretch, Stretches, stretches_refused};
-pub use turning::fast_turning;

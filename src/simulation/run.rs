@@ -1,9 +1,11 @@
 //! One record simulated.
 
+use super::branching::{Branching, branchings};
 use super::delay::{Delays, Schedule};
 use super::failure::{Detail, Failure};
 use super::involved::with_elements;
 use super::prepare::Record;
+use super::singular_joint::singular_joint;
 use super::slowness::Slowness;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::Symbol;
@@ -98,6 +100,8 @@ pub struct Trajectory {
     pub gradient: Vec<Vec<f64>>,
     /// Place probes (`System::probes`), each N samples; empty unless [`probe`] filled them.
     pub probes: Vec<Vec<f64>>,
+    /// Where closed loops could have gone on in another way; empty unless [`probe`] filled it.
+    pub branchings: Vec<Branching>,
     pub work: Work,
 }
 
@@ -114,7 +118,7 @@ pub fn simulate(
     Ok(run(compiled, record, theta, gradient, false, options(&compiled.study))?.0)
 }
 
-/// As [`simulate`] without gradient, and with the place probes along the solution.
+/// As [`simulate`] without gradient, and with the place probes along the solution and its branchings.
 ///
 /// # Errors
 /// [`Failure`] with time, cause and the state to blame.
@@ -159,7 +163,11 @@ fn run(
     let name = |i: usize| compiled.model.variables()[i].name.clone();
     let blame = |bound: &Bound, failure: integrate::Failure| {
         let equation = |i: usize| with_elements(compiled, i, bound.equation_name(i));
-        Failure::from_integration(&record.name, &failure, name, equation)
+        let mut told = Failure::from_integration(&record.name, &failure, name, equation);
+        if let Some(cause) = singular_joint(compiled, &failure.state, failure.component) {
+            told.help = cause;
+        }
+        told
     };
     let start = start(compiled, &mut bound, record, with_gradient).map_err(|failure| blame(&bound, failure))?;
     let schedule = Schedule::new(&compiled.delays, record, theta).ok_or_else(|| no_schedule(record, start.time))?;
@@ -181,9 +189,15 @@ fn run(
             help: "a measure or criterion divides by zero or takes the root of a negative number".to_owned(),
         });
     }
-    let probes = if with_probes { probes(&mut bound, record, &solution, &schedule) } else { Vec::new() };
+    let (mut places, mut passed) = (Vec::new(), Vec::new());
+    if with_probes {
+        places = probes(&mut bound, record, &solution, &schedule);
+        passed = branchings(compiled, &mut bound, &solution.times, &solution.y);
+    }
     let plan = solution.plan.take();
-    Ok((Trajectory { channels, gradient: gradients, probes, work: solution.work }, plan))
+    let trajectory =
+        Trajectory { channels, gradient: gradients, probes: places, branchings: passed, work: solution.work };
+    Ok((trajectory, plan))
 }
 
 pub(super) fn no_schedule(record: &Record, time: f64) -> Failure {
@@ -224,13 +238,29 @@ pub(super) fn start(
         if failure.cause != FailureCause::InconsistentStart {
             return Err(failure);
         }
-        // More positions of a loop are stated than it has freedoms: they say where it stands, not to the last digit. Then the
-        // same of velocities.
-        for given_up in [&[VariableKind::Position][..], &[VariableKind::Position, VariableKind::Velocity]] {
-            let kinds = compiled.model.variables().iter().map(|variable| variable.kind);
-            let kept: Vec<bool> =
-                kinds.zip(&stated).map(|(kind, is_stated)| *is_stated && !given_up.contains(&kind)).collect();
-            if let Ok(start) = integrate::consistent_start(bound, t0, &y, &sensitivity, &kept) {
+        // More positions of a loop are stated than it has freedoms: the first ones are kept, the others say where it stands, not to
+        // the last digit. Then the same of velocities.
+        let [positions, velocities] = [VariableKind::Position, VariableKind::Velocity].map(|kind| {
+            let order = stated_order(compiled, record.experiment);
+            order.into_iter().filter(|&i| compiled.model.variables()[i].kind == kind).collect::<Vec<usize>>()
+        });
+        let mut attempt = |kept_positions: usize, kept_velocities: usize| {
+            let mut kept = stated.clone();
+            let given_up = positions[kept_positions..].iter().chain(&velocities[kept_velocities..]);
+            given_up.for_each(|&i| kept[i] = false);
+            let (mut near, mut slopes) = (y.clone(), sensitivity.clone());
+            if let Some(references) = compiled.system.references.get(record.experiment) {
+                for &i in &positions[kept_positions..] {
+                    near[i] = references[i];
+                    slopes.iter_mut().skip(i).step_by(y.len()).for_each(|slope| *slope = 0.0);
+                }
+            }
+            integrate::consistent_start(bound, t0, &near, &slopes, &kept)
+        };
+        let most = (0..=positions.len()).rev().find(|&count| attempt(count, 0).is_ok());
+        let Some(most) = most else { return Err(failure) };
+        for count in (0..=velocities.len()).rev() {
+            if let Ok(start) = attempt(most, count) {
                 return Ok(start);
             }
         }
@@ -263,6 +293,20 @@ fn stated(compiled: &Compiled, experiment: usize) -> Vec<bool> {
         variable.kind == VariableKind::Law || overrides.iter().any(|(symbol, _)| *symbol == variable.symbol)
     };
     compiled.system.states.iter().map(is_stated).chain(compiled.system.algebraic.iter().map(|_| false)).collect()
+}
+
+/// The variables whose start values the experiment states, in the order in which it does.
+fn stated_order(compiled: &Compiled, experiment: usize) -> Vec<usize> {
+    let start = compiled.study.starts().nth(experiment);
+    let overrides = start.as_ref().map_or(&[][..], |(_, start, _)| &start.overrides[..]);
+    let place = |symbol: Symbol| compiled.system.states.iter().position(|variable| variable.symbol == symbol);
+    let mut order: Vec<usize> = Vec::new();
+    for at in overrides.iter().filter_map(|(symbol, _)| place(*symbol)) {
+        if !order.contains(&at) {
+            order.push(at);
+        }
+    }
+    order
 }
 
 pub(super) fn options(study: &Study) -> Options {

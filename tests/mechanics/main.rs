@@ -9,6 +9,7 @@ mod effects;
 mod elastic;
 mod faults;
 mod impacts;
+mod linkages;
 mod maximal;
 mod newton_euler;
 mod pendulum;
