@@ -1,6 +1,7 @@
 //! `ident fit` as users run it: interrupted and resumed, results saved and combined, optimisers, threads.
 
 use serde_json::Value;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -160,4 +161,60 @@ fn profiles_agree_with_the_linearisation_where_it_holds() {
 fn threads_do_not_change_a_digit_of_a_fit() {
     let on = |threads: &str| answer(&["fit", "--starts", "4", "--threads", threads], &study("spring_slide"));
     assert_eq!(on("1"), on("2"));
+}
+
+/// A blade that turns fast, a parallelogram that branches, and a slider whose stiffness is identified.
+const CAUTIOUS: &str = "study cautious\n\
+    body blade {\n\
+      mass = 0.42 kg, centre_of_gravity = (0.4 m, 0 m, 0 m), inertia = (0, 0.0224, 0.0224 kg*m^2)\n\
+      modes = \"arm_modes.csv\", damping_ratio = 1 %, mode_count = 1, point tip = (0.8 m, 0 m, 0 m)\n\
+    }\n\
+    joint shaft: revolute(z) ground -> blade { motion = 20 rad/s * t }\n\
+    body ground { point far = (0.5 m, 0 m, 1 m), point near = (0 m, 0 m, 1 m) }\n\
+    body c1 { mass = 1 kg, inertia = 0.01 kg*m^2, point tip = (0.1 m, 0 m, 0 m) }\n\
+    body c2 { mass = 1 kg, inertia = 0.01 kg*m^2, point tip = (0.1 m, 0 m, 0 m) }\n\
+    body rod { mass = 1 kg, inertia = 0.05 kg*m^2, point tip = (0.5 m, 0 m, 0 m) }\n\
+    joint crank_1: revolute(z) ground.near -> c1\njoint crank_2: revolute(z) ground.far -> c2\n\
+    joint a: revolute(z) c1.tip -> rod\njoint b: axes(shift z, turn x, turn y, turn z) rod.tip -> c2.tip\n\
+    body slider { mass = 1 kg }\njoint guide: prismatic(z) ground -> slider\n\
+    force spring: spring on guide { stiffness = c }\n\
+    measure z [mm] = guide.position\nidentify { c in 200 .. 800 N/m from 300 N/m }\n\
+    experiment run { data = \"run.csv\", start = rest {\n\
+      guide.position = 10 mm, crank_1.position = 1 rad, crank_2.position = 1 rad, crank_1.velocity = 4 rad/s\n\
+    } }\n\
+    manoeuvre turn { for 1 s, start = rest { crank_1.position = 1 rad, crank_2.position = 1 rad, crank_1.velocity = 4 rad/s } }\n\
+    criterion most [mm] = max(guide.position) in turn { below = 11 mm }\n";
+
+/// What a simulation neglects or leaves to chance is told by every command that simulates, before it goes on to longer work.
+#[test]
+fn cautions_reach_every_command() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let modes = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/elastic_arm/arm_modes.csv");
+    std::fs::copy(modes, folder.path().join("arm_modes.csv")).expect("copied");
+    let rows = (0..=100).map(|k| f64::from(k) * 0.01).map(|t| format!("{t},{}\n", 10.0 * (20.0 * t).cos()));
+    std::fs::write(folder.path().join("run.csv"), format!("t [s],z [mm]\n{}", rows.collect::<String>()))
+        .expect("written");
+    let study = folder.path().join("cautious.ident");
+    std::fs::write(&study, CAUTIOUS).expect("written");
+    for (name, records) in [("simulate", 2), ("fit", 1), ("compare", 1), ("validate", 2), ("diagnose", 1)] {
+        let mut child = command(&[name, "--quiet"], &study)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let told = BufReader::new(child.stderr.take().expect("its standard error"));
+        let mut found = [0, 0];
+        for line in told.lines() {
+            let line = line.expect("text");
+            found[0] += usize::from(line.starts_with("warning[E0316]: elastic body `blade`"));
+            found[1] += usize::from(line.starts_with("warning[E0317]: the loop through `b`"));
+            if found == [records; 2] {
+                break;
+            }
+        }
+        // What a diagnosis does after its warnings takes minutes.
+        let _ = child.kill();
+        child.wait().expect("it ends");
+        assert_eq!(found, [records; 2], "{name}");
+    }
 }
