@@ -469,6 +469,14 @@ codes! {
      \n\
      \x20   coupling same: crank_1.position = crank_2.position\n"
 
+    START_MOVED "E0318" "start that the loops do not allow"
+    "A start may state more coordinates than a mechanism has freedoms, to say which way it stands: the first ones are kept, the others are\n\
+     moved to where the loops close. Here one is moved far, or a velocity is another one: the loops do not allow both, or hold this\n\
+     coordinate altogether.\n\
+     State as many coordinates as `ident check` counts freedoms, and those that matter first:\n\
+     \n\
+     \x20   start = rest { crank.position = 10 deg, crank.velocity = 20 rad/s }\n"
+
     // ---- E04xx: data files and signals ----
 
     DATA_FILE_UNREADABLE "E0401" "data file cannot be read"

@@ -1,9 +1,10 @@
 //! What to know of a simulation that succeeded: what is neglected in the model would count, or chance decided.
 
 use super::prepare::Record;
-use super::run::{Compiled, Trajectory, probe};
+use super::run::{Compiled, Moved, Trajectory, probe};
 use crate::diagnostics::{Code, Diagnostic};
-use crate::mechanics::TURNING;
+use crate::mechanics::{TURNING, VariableKind};
+use crate::quantities::Dimension;
 use crate::study::Body;
 
 /// Angular velocity over the lowest circular frequency from which on it is told: centrifugal forces, which go with its square,
@@ -28,7 +29,7 @@ pub fn cautions(compiled: &Compiled, record: &Record, theta: &[f64]) -> Vec<Diag
 /// As [`cautions`], of a trajectory by [`probe`].
 pub fn cautions_about(compiled: &Compiled, record: &Record, trajectory: &Trajectory) -> Vec<Diagnostic> {
     let turning = compiled.study.bodies.iter().filter_map(|body| fast_turning(compiled, record, trajectory, body));
-    turning.chain(branching(compiled, record, trajectory)).collect()
+    turning.chain(moved_start(compiled, record, trajectory)).chain(branching(compiled, record, trajectory)).collect()
 }
 
 /// Whether an elastic body turns so fast that what is neglected of its deformation would count.
@@ -50,6 +51,51 @@ fn fast_turning(compiled: &Compiled, record: &Record, trajectory: &Trajectory, b
         .label(span, "these modes do not know what centrifugal forces do to their stiffness")
         .help("divide the body into several by joints with bending springs, or keep to slower records");
     Some(diagnostic)
+}
+
+/// Stated positions that say which way a mechanism stands are moved by less than this share and so many typical magnitudes; stated
+/// velocities are meant.
+const ROUGHLY: (f64, f64) = (0.2, 2.0);
+const EXACTLY: (f64, f64) = (0.01, 0.1);
+
+/// Stated start values that the loops do not allow, not even roughly.
+fn moved_start(compiled: &Compiled, record: &Record, trajectory: &Trajectory) -> Option<Diagnostic> {
+    let (_, _, span) = compiled.study.starts().nth(record.experiment)?;
+    let variables = compiled.model.variables();
+    let is_far = |moved: &&Moved| {
+        let variable = &variables[moved.state];
+        let (share, magnitudes) = if variable.kind == VariableKind::Velocity { EXACTLY } else { ROUGHLY };
+        (moved.taken - moved.stated).abs() > share * moved.stated.abs() + magnitudes * variable.scale
+    };
+    let told: Vec<String> = trajectory
+        .moved
+        .iter()
+        .filter(is_far)
+        .map(|moved| {
+            let variable = &variables[moved.state];
+            let unit = unit(variable.dimension);
+            // Without a sign of zero.
+            let [taken, stated] = [moved.taken, moved.stated].map(|value| (value * 1e4).round() / 1e4 + 0.0);
+            format!("`{}` starts at {taken:.4}{unit} instead of {stated:.4}{unit}", variable.name)
+        })
+        .collect();
+    if told.is_empty() {
+        return None;
+    }
+    let message = format!("the loops do not allow what the start of {} states: {}", record.name, told.join(", "));
+    let diagnostic = Diagnostic::warning(Code::START_MOVED, message)
+        .label(span, "started here")
+        .note("what is stated first is kept as far as the loops allow")
+        .help("state as many coordinates as the mechanism has freedoms, those that matter first; the others follow");
+    Some(diagnostic)
+}
+
+fn unit(dimension: Dimension) -> String {
+    match dimension {
+        Dimension::ONE => " rad".to_owned(),
+        other if other == Dimension::ONE / Dimension::TIME => " rad/s".to_owned(),
+        other => format!(" {other}"),
+    }
 }
 
 /// The first position in which a loop could have gone on in another way, and how many there are.

@@ -167,6 +167,7 @@ mod tests {
             gradient: vec![vec![1.0, 2.0, 3.0, 4.0], vec![0.0; 4]],
             probes: Vec::new(),
             branchings: Vec::new(),
+            moved: Vec::new(),
             work: crate::integrate::Work::default(),
         };
         let ours = directional(&trajectory, &[1.0, -1.0]);

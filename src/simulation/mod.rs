@@ -26,6 +26,6 @@ pub use failure::{Detail, Failure};
 pub use inputs::RecordInputs;
 pub use manoeuvre::{excitation, manoeuvre};
 pub use prepare::{Record, prepare};
-pub use run::{Compiled, Gradient, Trajectory, probe, simulate, slowness};
+pub use run::{Compiled, Gradient, Moved, Trajectory, probe, simulate, slowness};
 pub use slowness::{Limit, Slowness};
 pub use stretch::{Observation, State, Stretch, Stretches, stretches_refused};

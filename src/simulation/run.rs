@@ -102,6 +102,8 @@ pub struct Trajectory {
     pub probes: Vec<Vec<f64>>,
     /// Where closed loops could have gone on in another way; empty unless [`probe`] filled it.
     pub branchings: Vec<Branching>,
+    /// Stated start values that the loops do not allow.
+    pub moved: Vec<Moved>,
     pub work: Work,
 }
 
@@ -175,7 +177,9 @@ fn run(
         .map_err(|failure| blame(&bound, failure))?;
     let moved = moved_starts(compiled, &mut bound, record, &start);
     if !moved.is_empty() {
-        solution.work.reason += &format!("; start values moved to close the loops: {}", moved.join(", "));
+        let names: Vec<&str> =
+            moved.iter().map(|moved| compiled.model.variables()[moved.state].name.as_str()).collect();
+        solution.work.reason += &format!("; start values moved to close the loops: {}", names.join(", "));
     }
     let (channels, gradients) = outputs(&mut bound, record, &solution, &schedule, with_gradient);
     let finite = channels.iter().flatten().chain(gradients.iter().flatten()).all(|value| value.is_finite());
@@ -196,7 +200,7 @@ fn run(
     }
     let plan = solution.plan.take();
     let trajectory =
-        Trajectory { channels, gradient: gradients, probes: places, branchings: passed, work: solution.work };
+        Trajectory { channels, gradient: gradients, probes: places, branchings: passed, moved, work: solution.work };
     Ok((trajectory, plan))
 }
 
@@ -271,14 +275,23 @@ pub(super) fn start(
     Ok(Start { time: t0, y, y_prime, sensitivity })
 }
 
-/// Stated start values that did not close the loops and were moved.
-fn moved_starts(compiled: &Compiled, bound: &mut Bound, record: &Record, start: &Start) -> Vec<String> {
+/// A stated start value that did not close the loops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moved {
+    /// Index into [`System::states`].
+    pub state: usize,
+    /// SI
+    pub stated: f64,
+    pub taken: f64,
+}
+
+fn moved_starts(compiled: &Compiled, bound: &mut Bound, record: &Record, start: &Start) -> Vec<Moved> {
     let given = bound.start_values(record.experiment, start.time).values;
     let variables = compiled.model.variables().iter().zip(stated(compiled, record.experiment));
     let moved = variables.enumerate().filter(|(i, (variable, is_stated))| {
         *is_stated && (start.y[*i] - given[*i]).abs() > VISIBLE_MOVE * variable.scale
     });
-    moved.map(|(_, (variable, _))| variable.name.clone()).collect()
+    moved.map(|(state, _)| Moved { state, stated: given[state], taken: start.y[state] }).collect()
 }
 
 /// Start values that move by less, relative to their typical magnitude, count as kept.

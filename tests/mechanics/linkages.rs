@@ -272,3 +272,24 @@ fn joints_with_motions_that_fall_together_are_named() {
     let failure = probe(&lost, &manoeuvre(&lost.study, 0), &[]).expect_err("nothing holds one of the shifts");
     assert!(failure.help.contains("joint `slide` are not independent"), "{}", failure.help);
 }
+
+/// A rod whose tube axis runs through its ball spins about itself only: the crank cannot move, and a start that says it does is told.
+#[test]
+fn a_start_speed_that_the_loops_do_not_allow_is_told() {
+    let locked = compiled(
+        "study locked\ngravity = 9.81 m/s^2 along -z\nbody ground { point far = (0.4 m, 0.1 m, 0.05 m) }
+         body crank { mass = 1 kg, inertia = 0.01 kg*m^2, point tip = (0.1 m, 0 m, 0 m) }
+         body rod { mass = 1 kg, inertia = (0.002, 0.02, 0.02 kg*m^2) }
+         body rocker { mass = 2 kg, inertia = 0.03 kg*m^2, point tip = (0 m, 0 m, 0.2 m) }
+         joint motor: revolute(z) ground -> crank\njoint ball: spherical crank.tip -> rod
+         joint foot: revolute(0.2, 1, 0.1) ground.far -> rocker\njoint tube: cylindrical(1, 0.1, 0.3) rod -> rocker.tip
+         measure angle [rad] = motor.position
+         manoeuvre go { for 0.2 s, step = 2 ms, start = rest { motor.velocity = 10 rad/s } }\ncriterion c = max(angle) in go\n",
+    );
+    let told = cautions(&locked, &manoeuvre(&locked.study, 0), &[]);
+    let [warning] = told.as_slice() else { panic!("one warning: {told:?}") };
+    assert!(
+        warning.message.ends_with("`motor.velocity` starts at 0.0000 rad/s instead of 10.0000 rad/s"),
+        "{warning:?}"
+    );
+}
