@@ -47,10 +47,10 @@ impl Curve {
         let (first, last) = (self.knots[0], self.knots[self.pieces.len()]);
         if (first..=last).contains(&x) {
             let piece = (self.knots.partition_point(|knot| *knot <= x).max(1) - 1).min(self.pieces.len() - 1);
-            return polynomial(&self.pieces[piece], x - self.knots[piece], order);
+            return polynomial(&self.pieces[piece], x - self.knots[piece], usize::from(order));
         }
         let (end, piece) = if x < first { (first, 0) } else { (last, self.pieces.len() - 1) };
-        let at_end = |order: u8| polynomial(&self.pieces[piece], end - self.knots[piece], order);
+        let at_end = |order: u8| polynomial(&self.pieces[piece], end - self.knots[piece], usize::from(order));
         match (self.beyond, order) {
             (Beyond::Undefined, _) => f64::NAN,
             (Beyond::Constant, 0) => at_end(0),
@@ -83,7 +83,8 @@ impl Curve {
     }
 }
 
-fn polynomial([a, b, c, d]: &[f64; 4], x: f64, order: u8) -> f64 {
+/// `a + b x + c x^2 + d x^3` or its derivative of this order.
+pub(crate) fn polynomial([a, b, c, d]: &[f64; 4], x: f64, order: usize) -> f64 {
     match order {
         0 => a + x * (b + x * (c + x * d)),
         1 => b + x * (2.0 * c + x * 3.0 * d),

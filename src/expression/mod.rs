@@ -18,6 +18,7 @@ mod properties;
 mod simplify;
 pub(crate) mod vector;
 
+pub(crate) use curve::polynomial;
 pub use curve::{Beyond, Curve};
 pub use differentiate::Entry;
 pub use graph::{Binary, CURVES, Graph, Node, Operation, Symbol, Unary, curve_of};

@@ -1,5 +1,6 @@
 //! Sampled inputs as functions of time.
 
+use crate::expression::polynomial;
 use crate::study::Interpolation;
 
 /// A column of samples as a function of time.
@@ -56,14 +57,7 @@ impl Interpolant {
         }
         let piece = (position as usize).min(self.coefficients.len() - 1);
         let local = t - self.start - piece as f64 * self.step;
-        let [a, b, c, d] = self.coefficients[piece];
-        match order {
-            0 => a + local * (b + local * (c + local * d)),
-            1 => b + local * (2.0 * c + local * 3.0 * d),
-            2 => 2.0 * c + 6.0 * d * local,
-            3 => 6.0 * d,
-            _ => 0.0,
-        }
+        polynomial(&self.coefficients[piece], local, order)
     }
 
     pub fn start(&self) -> f64 {
