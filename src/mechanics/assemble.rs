@@ -237,13 +237,16 @@ fn turning(graph: &mut Graph, study: &Study, tree: &Tree, frames: &[FrameMotion]
     tree.modal.iter().filter_map(of_body).collect()
 }
 
+/// Per start of the study the equations of all states, and a position that closes the loops.
+type Starts = (Vec<Vec<StartEquation>>, Vec<Vec<f64>>);
+
 fn all_starts(
     graph: &mut Graph,
     study: &Study,
     states: &[Variable],
     meaning: &HashMap<Symbol, Node>,
     loops: &Loops,
-) -> Result<(Vec<Vec<StartEquation>>, Vec<Vec<f64>>), Vec<Diagnostic>> {
+) -> Result<Starts, Vec<Diagnostic>> {
     let initial: Vec<Node> = study.states.iter().map(|state| state.initial).collect();
     let initial = graph.substitute(&initial, meaning);
     let initial: HashMap<Symbol, Node> = study.states.iter().map(|state| state.symbol).zip(initial).collect();

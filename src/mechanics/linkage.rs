@@ -24,6 +24,8 @@ const FAR: f64 = 3.0;
 
 /// A loop that is closed further than this from the start (rad; m) may have been meant otherwise.
 const NEAR: f64 = 0.5;
+/// Stated coordinates that are moved by less (rad; m) stand where they were meant to.
+const AS_STATED: f64 = 0.2;
 /// Positions whose coordinates differ by more than this (rad; m) are different ways to stand.
 const ELSEWHERE: f64 = 0.1;
 /// Tries to find another position, and the size of mechanism up to which it is tried.
@@ -181,16 +183,51 @@ impl Linkage {
             let from = self.values.clone();
             outcome = self.close_by(&from, &moved).map_err(|_| residual.clone());
         }
+        if outcome.is_ok() {
+            let nearest = self.nearest_stated(&start, order, (&unstated, &moved));
+            self.values = nearest;
+        }
         let closed = std::mem::replace(&mut self.values, drawn);
         outcome.map(|()| closed)
     }
 
-    /// Closes the loops from one position by the first of these sets of coordinates that can. The residual of the last one otherwise.
+    /// Of several ways to close the loops, the present one first, that in which the stated coordinates are nearest to what is stated.
+    fn nearest_stated(
+        &mut self,
+        start: &HashMap<Symbol, f64>,
+        order: &[Symbol],
+        (unstated, moved): (&[usize], &[Vec<usize>]),
+    ) -> HashMap<Symbol, f64> {
+        let value = |values: &HashMap<Symbol, f64>, s: &Symbol| values.get(s).copied().unwrap_or(0.0);
+        let apart = |values: &HashMap<Symbol, f64>| {
+            order.iter().map(|s| (value(values, s) - value(start, s)).abs()).fold(0.0, f64::max)
+        };
+        let mut best = self.values.clone();
+        for attempt in 0..TRIES {
+            if apart(&best) < AS_STATED {
+                break;
+            }
+            self.values = start.clone();
+            self.move_far(unstated, attempt * ATTEMPTS / TRIES, 1.0);
+            let from = self.values.clone();
+            if self.close_by(&from, moved).is_ok() && apart(&self.values) < apart(&best) {
+                best = self.values.clone();
+            }
+        }
+        best
+    }
+
+    /// Closes the loops from one position by the first of these sets of coordinates that can, each beginning where the one before came
+    /// nearest: what is stated too much says the way first. The residual of the last one otherwise.
     fn close_by(&mut self, from: &HashMap<Symbol, f64>, sets: &[Vec<usize>]) -> Result<(), Vec<f64>> {
         let mut outcome = Err(Vec::new());
-        for moved in sets {
-            self.values = from.clone();
+        self.values = from.clone();
+        for (number, moved) in sets.iter().enumerate() {
             outcome = self.close(moved);
+            if outcome.is_err() && number > 0 {
+                self.values = from.clone();
+                outcome = self.close(moved);
+            }
             if outcome.is_ok() {
                 break;
             }

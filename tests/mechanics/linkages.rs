@@ -43,12 +43,15 @@ fn peaucellier_draws_a_straight_line() {
          joint p1: revolute(z) l1.tip -> s3\njoint p2: revolute(z) l2.tip -> s4
          joint p: revolute(z) s3.tip -> s4.tip
          measure angle [rad] = motor.position\nmeasure x [m] = s3.tip.position.x\nmeasure y [m] = s3.tip.position.y
+         measure left [rad] = o1.position
          manoeuvre go {{ for 0.5 s, step = 5 ms, start = rest {{ motor.position = 0.2 rad, motor.velocity = 1 rad/s
-           o1.position = 24 deg, o2.position = -15 deg }} }}
+           o1.position = 24 deg, o2.position = -15 deg, p1.position = -90 deg }} }}
          criterion c = max(x) in go\n"
     ));
     let power = 3.5_f64.powi(2) - 1.2_f64.powi(2);
     assert!((own["angle"][0] - 0.2).abs() < 1e-9, "the first stated position is kept: {}", own["angle"][0]);
+    // Mirrored, the links would stand at about 25 and -14 degrees the other way round.
+    assert!((own["left"][0] - 24_f64.to_radians()).abs() < 0.05, "{}", own["left"][0]);
     assert_near(&own["x"], 1e-7, |_| power / 3.0);
     // The crank's end is seen from the pivot under half its angle.
     assert_near(&own["y"], 1e-7, |k| power / 3.0 * (own["angle"][k] / 2.0).tan());
@@ -174,9 +177,9 @@ fn a_gyroscope_in_gimbals_precesses_and_nods() {
     };
     let (mut state, parts) = ([0.0, 0.3, 0.0, 0.0], 40);
     let h = 4e-3 / f64::from(parts);
-    for k in 0..own["yaw_angle"].len() {
+    for (k, shown) in own["yaw_angle"].iter().enumerate() {
         let [yaw, pitch, yaw_rate, pitch_rate] = state;
-        assert!((own["yaw_angle"][k] - yaw).abs() < 1e-8 && (own["pitch_angle"][k] - pitch).abs() < 1e-8, "sample {k}");
+        assert!((shown - yaw).abs() < 1e-8 && (own["pitch_angle"][k] - pitch).abs() < 1e-8, "sample {k}");
         let torque = -polar * (pitch.cos() * pitch_rate * yaw_rate + pitch.sin() * rates(state)[2]);
         assert!((own["drive"][k] - torque).abs() < 1e-7, "sample {k}: {} instead of {torque}", own["drive"][k]);
         for _ in 0..parts {
