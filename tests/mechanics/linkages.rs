@@ -296,3 +296,26 @@ fn a_start_speed_that_the_loops_do_not_allow_is_told() {
         "{warning:?}"
     );
 }
+
+/// The cure for a redundant joint that slides as well keeps its own slide beside what is let go.
+#[test]
+fn the_cure_of_a_redundant_joint_keeps_its_freedom() {
+    let text = "study slot\nbody ground { point pin = (0.4 m, 0 m, 0.3 m) }
+         body crank { mass = 1 kg, inertia = 0.01 kg*m^2, point tip = (0.1 m, 0 m, 0 m) }
+         body lever { mass = 1 kg, inertia = 0.05 kg*m^2 }
+         joint motor: revolute(y) ground -> crank\njoint hinge: revolute(y) ground.pin -> lever
+         joint slot: axes(shift x, turn y) lever -> crank.tip\nmeasure angle = motor.position
+         manoeuvre go { for 1 s, start = rest { motor.position = 0.5 rad } }\ncriterion c = max(angle) in go\n";
+    let study = checked(text, &[]).unwrap_or_else(|findings| panic!("{findings}"));
+    let warnings = derive(&study).expect("it moves").warnings;
+    let cure = |warning: &ident::diagnostics::Diagnostic| {
+        warning.help.iter().find(|help| help.contains("`joint slot")).cloned()
+    };
+    let cures: Vec<String> = warnings.iter().filter_map(cure).collect();
+    let [cure] = cures.as_slice() else { panic!("one cure: {warnings:?}") };
+    assert!(cure.contains("axes(shift x, shift y, turn x, turn y, turn z)"), "{cure}");
+    let cured = text.replace("axes(shift x, turn y)", "axes(shift x, shift y, turn x, turn y, turn z)");
+    let study = checked(&cured, &[]).unwrap_or_else(|findings| panic!("{findings}"));
+    let left = derive(&study).expect("it moves").warnings;
+    assert!(left.iter().all(|warning| !warning.message.contains("already")), "{left:?}");
+}
