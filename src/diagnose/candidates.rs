@@ -2,10 +2,15 @@
 //! fixed. A candidate is nothing but the text of a variant with start values to try.
 
 use super::typical::Typical;
+use crate::expression::{Node, Operation};
 use crate::quantities::{Dimension, Unit};
-use crate::study::{EffectDeclaration, EffectParameter, ForcePlace, Place, PlaceKind, PlaceQuantity, Study};
+use crate::study::{
+    AxisMotion, Body, EffectDeclaration, EffectParameter, ForcePlace, Place, PlaceKind, PlaceQuantity, Study,
+};
 use std::fmt::Write;
 
+/// A unit vector's component this near to one is the axis itself.
+const ALONG: f64 = 1e-9;
 /// Amplitudes of effects that declare no range may grow to this multiple of their natural scale.
 const AMPLITUDE_REACH: f64 = 1000.0;
 /// Significant digits of numbers in generated text.
@@ -130,7 +135,56 @@ impl Candidate {
 pub(super) fn candidates(study: &Study, typical: &[Typical]) -> Vec<Candidate> {
     let mut list = at_all_places(study, typical, |effect| !effect.is_unnamed());
     list.extend(study.constants.iter().filter_map(|constant| freed_constant(study, constant)));
+    list.extend(study.bodies.iter().enumerate().filter_map(|(index, body)| eccentric_body(study, index, body)));
     list
+}
+
+/// A body that turns about an axis through its centre of gravity, as far as the study says: unbalance, eccentric wheels.
+fn eccentric_body(study: &Study, index: usize, body: &Body) -> Option<Candidate> {
+    let turns = study.joints.iter().filter(|joint| joint.child.body == Some(index) && joint.orientation.is_none());
+    let turns: Vec<[f64; 3]> = turns
+        .flat_map(|joint| &joint.axes)
+        .filter_map(|axis| matches!(axis.motion, AxisMotion::Turn(_)).then(|| axis.motion.direction()))
+        .collect();
+    let mass = start_value(study, body.mass).filter(|mass| *mass > 0.0)?;
+    let moments = [0, 1, 2].map(|axis| start_value(study, body.inertia[axis]).unwrap_or(0.0));
+    let radius = (moments.into_iter().fold(0.0, f64::max) / mass).sqrt();
+    let across = |axis: &usize| turns.iter().any(|turn| turn[*axis].abs() < 1.0 - ALONG);
+    let central = |axis: &usize| study.graph.is_zero(body.centre_of_gravity[*axis]);
+    let unknowns: Vec<Unknown> = (0..3)
+        .filter(|axis| across(axis) && central(axis))
+        .map(|axis| Unknown {
+            target: format!("{}.centre_of_gravity.{}", body.name, ["x", "y", "z"][axis]),
+            dimension: Dimension { length: 1, ..Dimension::default() },
+            lower: -radius,
+            upper: radius,
+            neutral: 0.0,
+            prior: None,
+            role: UnknownRole::Amplitude,
+        })
+        .collect();
+    (radius > 0.0 && body.elastic.is_none() && !unknowns.is_empty()).then(|| Candidate {
+        name: format!("{}.centre_of_gravity set free", body.name),
+        effect: "constant".to_owned(),
+        place: format!("{}.centre_of_gravity", body.name),
+        aliases: Vec::new(),
+        title: format!("The centre of gravity of {} is not where the study has it: unbalance", body.name),
+        unknowns,
+        element: String::new(),
+        change: String::new(),
+    })
+}
+
+/// A number, or where a parameter starts.
+fn start_value(study: &Study, node: Node) -> Option<f64> {
+    let starts = study.graph.symbols_of(&[node]);
+    match starts.as_slice() {
+        [] => study.graph.constant_value(node),
+        [symbol] if study.graph.operation(node) == Operation::Symbol(*symbol) => {
+            study.parameters.iter().find(|parameter| parameter.symbol == *symbol).map(|parameter| parameter.start)
+        }
+        _ => None,
+    }
 }
 
 /// Forces of free shape at all places.

@@ -6,7 +6,7 @@ use super::records::Roles;
 use super::round::Round;
 use super::screen::Screened;
 use super::telling;
-use super::{Answer, Candidate as Reported, ChannelAnatomy, MissingForce, Step, Verdict};
+use super::{Accepted, Answer, Candidate as Reported, ChannelAnatomy, MissingForce, Step, Verdict};
 use crate::identify::Identification;
 use crate::quantities::{Unit, format_number};
 use crate::simulation::Compiled;
@@ -35,15 +35,22 @@ pub(super) struct Course {
     pub unnamed: bool,
     /// The search ended because enough extensions were accepted, not because nothing further was found.
     pub limit_reached: bool,
-    /// An accepted cause has rivals besides other names of the same force.
-    ambiguous: bool,
-    /// Which tests would tell rivals apart.
-    telling: Vec<String>,
+    /// Of each step, in their order.
+    notes: Vec<Note>,
     /// What else the search has to say.
     pub remarks: Vec<String>,
-    /// Shape parameters of accepted effects.
-    shapes: Vec<String>,
     cannot_judge: Vec<String>,
+}
+
+/// What a step adds to the answer as long as its cause stays accepted.
+#[derive(Default)]
+struct Note {
+    /// The cause has rivals besides other names of the same force.
+    ambiguous: bool,
+    /// Which test would tell them apart.
+    telling: Option<String>,
+    /// Shape parameters of the effect.
+    shapes: Vec<String>,
 }
 
 impl Course {
@@ -66,10 +73,21 @@ impl Course {
             step.judgement = format!("{}; withdrawn, since {curve} alone explains more", step.judgement);
         }
         self.texts.clear();
-        self.telling.clear();
-        self.shapes.clear();
-        self.ambiguous = false;
+        self.notes.iter_mut().for_each(|note| *note = Note::default());
         self.limit_reached = false;
+    }
+
+    /// Takes back the `index`th of the causes accepted so far; `texts` are the variants that add the others.
+    pub(super) fn eliminate(&mut self, index: usize, texts: &[String], accepted: &[Accepted]) {
+        let Some(position) = (0..self.steps.len()).filter(|&at| self.steps[at].accepted.is_some()).nth(index) else {
+            return;
+        };
+        let beside: Vec<&str> = accepted[index + 1..].iter().map(|other| other.candidate.name.as_str()).collect();
+        let step = &mut self.steps[position];
+        step.accepted = None;
+        step.judgement = format!("{}; taken out again: not needed beside {}", step.judgement, beside.join(" and "));
+        self.notes[position] = Note::default();
+        self.texts = texts.to_vec();
     }
 
     /// Takes back all that was accepted: beside what it leaves unexplained, its share of the held-out error, `gain`, is small.
@@ -86,9 +104,7 @@ impl Course {
             format_number(100.0 * gain, 2)
         ));
         self.texts.clear();
-        self.telling.clear();
-        self.shapes.clear();
-        self.ambiguous = false;
+        self.notes.iter_mut().for_each(|note| *note = Note::default());
         self.unnamed = false;
     }
 
@@ -113,13 +129,15 @@ impl Course {
         }
         let accepted =
             chosen.and_then(|position| order.iter().position(|&index| index == judged[position].refitted.candidate));
-        if let Some(position) = chosen {
+        let note = |position: usize| {
             let rivals = judge::rivals(judged, position);
-            self.ambiguous |= !rivals.is_empty();
+            let ambiguous = !rivals.is_empty();
             let group: Vec<usize> = std::iter::once(position).chain(rivals).collect();
-            self.telling.extend(telling::telling(round, candidates, judged, &group));
-            self.shapes.extend(candidates[judged[position].refitted.candidate].shapes());
-        }
+            let telling = telling::telling(round, candidates, judged, &group);
+            let shapes = candidates[judged[position].refitted.candidate].shapes().collect();
+            Note { ambiguous, telling, shapes }
+        };
+        self.notes.push(chosen.map(note).unwrap_or_default());
         let judgement = judgement(judged, chosen, candidates, self.below_visibility);
         reported.truncate(SHOWN);
         self.steps.push(Step {
@@ -146,9 +164,15 @@ impl Course {
         let mut remarks = base.remarks.clone();
         remarks.extend(extended.remarks.iter().filter(|remark| !base.remarks.contains(remark)).cloned());
         // A shape at the end of its grid range (a creep velocity too small to be resolved) is no structural error.
-        remarks
-            .retain(|remark| !self.shapes.iter().any(|shape| remark.starts_with(&format!("{shape} is at its bound"))));
-        remarks.extend(self.telling.iter().chain(&self.remarks).cloned());
+        remarks.retain(|remark| {
+            !self
+                .notes
+                .iter()
+                .flat_map(|note| &note.shapes)
+                .any(|shape| remark.starts_with(&format!("{shape} is at its bound")))
+        });
+        let telling = self.notes.iter().filter_map(|note| note.telling.as_ref());
+        remarks.extend(telling.chain(&self.remarks).cloned());
         if verdict != Verdict::NoCauseFound {
             remarks.extend(self.sensors.iter().cloned());
         }
@@ -200,7 +224,7 @@ impl Course {
         if self.unnamed {
             return Verdict::ShapeWithoutName;
         }
-        if self.ambiguous { Verdict::GroupOfCauses } else { Verdict::CauseNamed }
+        if self.notes.iter().any(|note| note.ambiguous) { Verdict::GroupOfCauses } else { Verdict::CauseNamed }
     }
 
     fn summary(&self, verdict: &Verdict, base: &Identification, extended: &Identification) -> String {
@@ -208,11 +232,8 @@ impl Course {
             Some(held_out) => format!("{:.3} % estimation, {held_out:.3} % held out", fit.estimation_discrepancy),
             None => format!("{:.3} % estimation", fit.estimation_discrepancy),
         };
-        let named: Vec<&str> = self
-            .steps
-            .iter()
-            .filter_map(|step| step.accepted.map(|position| step.ranking[position].name.as_str()))
-            .collect();
+        let accepted = self.steps.iter().filter_map(|step| Some(step.ranking[step.accepted?].name.clone()));
+        let named = counted(accepted);
         match verdict {
             Verdict::NothingWrongFound => format!(
                 "Nothing wrong found: no candidate improves the held-out record beyond chance (discrepancy {}).",
@@ -245,12 +266,8 @@ impl Course {
                 level(extended)
             ),
             Verdict::GroupOfCauses => {
-                let groups: Vec<String> = self
-                    .steps
-                    .iter()
-                    .filter(|step| step.accepted.is_some())
-                    .map(|step| step.rivals().join(" or "))
-                    .collect();
+                let accepted = self.steps.iter().filter(|step| step.accepted.is_some());
+                let groups = counted(accepted.map(|step| step.rivals().join(" or ")));
                 format!(
                     "Missing: {} (this data cannot tell the members of a group apart). Discrepancy {} -> {}.",
                     groups.join(", then "),
@@ -260,6 +277,19 @@ impl Course {
             }
         }
     }
+}
+
+/// Names in the order in which they first come; those that come several times once, with how often.
+fn counted(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut counts: Vec<(String, usize)> = Vec::new();
+    for name in names {
+        match counts.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((name, 1)),
+        }
+    }
+    let told = |(name, count): (String, usize)| if count > 1 { format!("{name} ({count} times)") } else { name };
+    counts.into_iter().map(told).collect()
 }
 
 /// Refitted candidates in the order of their criterion, then the others in the order of the screen.

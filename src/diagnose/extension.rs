@@ -1,7 +1,7 @@
 //! The accepted extension as text in the study's own language.
 
 use super::candidates::Candidate;
-use super::refit::Refitted;
+use crate::simulation::Compiled;
 use crate::study::Study;
 
 /// Name for the variant that adds `candidate`, unused so far in `study`.
@@ -18,14 +18,20 @@ pub(super) fn variant_name(study: &Study, candidate: &Candidate) -> String {
     (2..).map(|count| format!("{wanted}_{count}")).find(|name| !used(name)).unwrap_or(wanted)
 }
 
-/// The variant's text, starting at the fitted values.
-pub(super) fn variant_text(name: &str, base: &str, candidate: &Candidate, refitted: &Refitted) -> String {
+/// The variant's text, starting at the values `theta` of the parameters of `compiled`.
+pub(super) fn variant_text(
+    name: &str,
+    base: &str,
+    candidate: &Candidate,
+    compiled: &Compiled,
+    theta: &[f64],
+) -> String {
     let values: Vec<f64> = candidate
         .unknowns
         .iter()
         .map(|unknown| {
-            let position = refitted.compiled.study.parameters.iter().position(|p| p.name == unknown.target);
-            position.map_or(unknown.neutral, |index| refitted.fitted.theta[index])
+            let position = compiled.study.parameters.iter().position(|p| p.name == unknown.target);
+            position.map_or(unknown.neutral, |index| theta[index])
         })
         .collect();
     let text = candidate.variant(name, base, &values);

@@ -12,7 +12,7 @@ use crate::statistics::{ErrorChange, block_length, chi_square_p, error_change};
 /// A held-out error must fall by more than this, % (measured to give no false alarm in empty cases).
 const MINIMUM_HELD_OUT_GAIN: f64 = 1.0;
 /// Evidence needed before an extension is believed (Kass-Raftery-1995: above 10 is very strong).
-const MINIMUM_BIC_GAIN: f64 = 10.0;
+pub(super) const MINIMUM_BIC_GAIN: f64 = 10.0;
 /// Refits whose criterion differs by less than this cannot be told apart (Kass-Raftery-1995).
 const INDISTINGUISHABLE_BIC: f64 = 6.0;
 /// Refits closer than this are the same but for rounding.
@@ -252,12 +252,15 @@ fn objection(
         return Some(reason);
     }
     match change {
-        Some(change) if 100.0 * change.estimate > -MINIMUM_HELD_OUT_GAIN || !change.is_improvement() => {
-            Some(super::TRANSFERS_NOT.to_owned())
-        }
+        Some(change) if !transfers(&change) => Some(super::TRANSFERS_NOT.to_owned()),
         None if has_held_out => Some("the held-out record cannot be simulated with it".to_owned()),
         _ => None,
     }
+}
+
+/// Whether the held-out error falls by more than chance and rounding let it.
+pub(super) fn transfers(change: &ErrorChange) -> bool {
+    100.0 * change.estimate <= -MINIMUM_HELD_OUT_GAIN && change.is_improvement()
 }
 
 /// Candidates that cannot be told from `judged[chosen]`: their criterion is as good within what the data can tell, and none

@@ -10,6 +10,7 @@ mod anatomy;
 mod answer;
 mod candidates;
 mod course;
+mod eliminate;
 mod extension;
 mod judge;
 mod missing_force;
@@ -46,6 +47,8 @@ const FULL_ITERATIONS: usize = 30;
 
 /// Share of the held-out error that causes must explain to be called that, where what they leave has a colour.
 const LEAST_EXPLAINED: f64 = 0.5;
+/// Rounds of the search per extension that may be accepted.
+const ROUNDS: usize = 2;
 const TRANSFERS_NOT: &str = "improves the fit, does not transfer to the held-out record";
 
 /// What to diagnose and how far to go.
@@ -86,6 +89,15 @@ struct Model {
     fitted: Fitted,
     /// Parameters that are strengths of accepted effects, with the value at which the effect vanishes.
     strengths: Vec<(String, f64)>,
+    /// What was accepted on the way here, in order.
+    accepted: Vec<Accepted>,
+}
+
+/// An accepted candidate and the variant that adds it to those before.
+#[derive(Clone)]
+struct Accepted {
+    candidate: candidates::Candidate,
+    variant: String,
 }
 
 /// Diagnoses a study with its measured records.
@@ -106,9 +118,13 @@ pub fn diagnose(
     let anatomy = anatomy::anatomy(&first.compiled, &first.fitted, &roles.estimation());
     let mut course = Course::default();
     let (mut named, mut model) = (Vec::new(), first);
-    while course.accepted() < options.maximum_extensions {
+    // A cause that was taken out must not come back and be taken out for ever.
+    while course.accepted() < options.maximum_extensions && course.steps.len() < ROUNDS * options.maximum_extensions {
         let Some(next) = extend(&model, &roles, &mut course, observer)? else { break };
         named.push(std::mem::replace(&mut model, next));
+        if course.accepted() > 1 {
+            model = eliminate::eliminate(&named[0], model, &roles, &mut course)?;
+        }
         course.limit_reached = course.accepted() == options.maximum_extensions;
     }
     if options.maximum_extensions > 0 {
@@ -150,7 +166,14 @@ fn first_model(
     let fitted = fit(&compiled, &roles.estimation(), &Settings::default(), &mut |_| Control::Continue)
         .map_err(|diagnostic| vec![diagnostic])?;
     observer(Event::Fitted { variant, discrepancy: fitted.discrepancy() });
-    Ok(Model { loaded: loaded.clone(), variant: variant.to_owned(), compiled, fitted, strengths: Vec::new() })
+    Ok(Model {
+        loaded: loaded.clone(),
+        variant: variant.to_owned(),
+        compiled,
+        fitted,
+        strengths: Vec::new(),
+        accepted: Vec::new(),
+    })
 }
 
 /// Share of the error that `extended` takes away from `model`: of the records that were not fitted, else of those that were.
@@ -273,7 +296,8 @@ fn adopt(
     records: &[&Record],
 ) -> Result<(Model, String), Vec<Diagnostic>> {
     let name = extension::variant_name(&model.compiled.study, candidate);
-    let text = extension::variant_text(&name, &model.variant, candidate, refitted);
+    let (start, theta) = (&refitted.compiled, &refitted.fitted.theta);
+    let text = extension::variant_text(&name, &model.variant, candidate, start, theta);
     let loaded = model.loaded.with_text(&text);
     let compiled = Compiled::new(study::check(&loaded, Some(&name))?.study)?;
     let start = Some(refitted.fitted.theta.clone());
@@ -284,5 +308,7 @@ fn adopt(
         fit(&compiled, records, &settings, &mut |_| Control::Continue).map_err(|diagnostic| vec![diagnostic])?;
     let mut strengths = model.strengths.clone();
     strengths.extend(candidate.strengths());
-    Ok((Model { loaded, variant: name, compiled, fitted, strengths }, text))
+    let mut accepted = model.accepted.clone();
+    accepted.push(Accepted { candidate: candidate.clone(), variant: name.clone() });
+    Ok((Model { loaded, variant: name, compiled, fitted, strengths, accepted }, text))
 }

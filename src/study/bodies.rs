@@ -32,7 +32,11 @@ impl<'a> Checker<'a> {
             let zero = self.graph.constant(0.0);
             let centre_of_gravity = match find(body.fields, "centre_of_gravity") {
                 Some(field) => self.vector(&format!("{name}.centre_of_gravity"), field).unwrap_or([zero; 3]),
-                None => [zero; 3],
+                None => AXES.map(|axis| {
+                    // Not written it is zero, but may be identified all the same.
+                    let freed = self.parameter(&format!("{name}.centre_of_gravity.{axis}"));
+                    freed.filter(|value| value.dimension == Dimension::LENGTH).map_or(zero, |value| value.node)
+                }),
             };
             let points = self.points(name, body.points);
             let span = body.name.span;
