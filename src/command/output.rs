@@ -80,3 +80,27 @@ pub(super) fn answer(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn answers_are_written_into_folders_that_do_not_exist_yet() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("answers/of/today/fit.json");
+        assert!(write_whole(&path, "{}").is_ok());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "{}");
+        let beside = std::fs::read_dir(path.parent().unwrap()).unwrap().count();
+        assert_eq!(beside, 1, "the temporary file is gone");
+    }
+
+    #[test]
+    fn a_file_in_the_way_is_told_and_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("answers");
+        std::fs::write(&file, "kept").unwrap();
+        assert!(write_whole(&file.join("fit.json"), "{}").is_err());
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
+    }
+}

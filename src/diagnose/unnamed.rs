@@ -130,9 +130,7 @@ fn serves_at(
     let own = screened[index].as_ref().map_or(f64::INFINITY, gain);
     candidates.iter().zip(screened).any(|(candidate, entry)| {
         let serves = |entry: &Screened| gain(entry) >= SAME_GAIN * own;
-        candidate.place == place
-            && candidate.effect == candidates[index].effect
-            && (candidate.name == candidates[index].name || entry.as_ref().is_some_and(serves))
+        candidate.place == place && candidate.effect == candidates[index].effect && entry.as_ref().is_some_and(serves)
     })
 }
 

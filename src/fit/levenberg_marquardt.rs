@@ -514,6 +514,37 @@ mod tests {
         assert!((estimate.theta[1] - estimate.theta[0] - 1.0).abs() < 1e-6, "{:?}", estimate.theta);
     }
 
+    /// The search moves along one coordinate: distances undo moves, and slopes are the derivatives of moves.
+    #[test]
+    fn coordinates_of_the_search_agree_with_each_other() {
+        let bounds = Bounds::new(vec![1e-3, -2.0, f64::NEG_INFINITY], vec![10.0, 4.0, f64::INFINITY]);
+        for (index, value) in [(0, 0.02), (1, 0.5), (2, -7.0)] {
+            let moved = bounds.moved(index, value, 0.125);
+            assert!((bounds.distance(index, value, moved) - 0.125).abs() < 1e-12);
+            let increment = 1e-6;
+            let difference =
+                (bounds.moved(index, value, increment) - bounds.moved(index, value, -increment)) / (2.0 * increment);
+            assert!((difference / bounds.slope(index, value) - 1.0).abs() < 1e-8, "parameter {index}");
+        }
+        assert_eq!(bounds.moved(0, 0.02, 2.0), 10.0, "held by its bound");
+        assert!((bounds.moved(0, 0.02, 0.25) / 0.02 - 10.0).abs() < 1e-12, "a quarter of four decades");
+    }
+
+    /// A rate that starts a thousand times too small, between bounds six decades apart, needs a few steps only.
+    #[test]
+    fn positive_parameters_are_searched_by_their_logarithm() {
+        let (level, rate) = (3.0, 0.2);
+        let function = |theta: &[f64]| {
+            let course = |t: f64| (theta[0] / level).ln() - theta[1] * t + rate * t;
+            Ok((0..20).map(|i| course(f64::from(i))).collect())
+        };
+        let bounds = Bounds::new(vec![1e-4, 1e-4], vec![100.0, 100.0]);
+        let estimate = fit(function, &[0.003, 2e-4], &bounds);
+        assert!((estimate.theta[0] / level - 1.0).abs() < 1e-6, "{:?}", estimate.theta);
+        assert!((estimate.theta[1] / rate - 1.0).abs() < 1e-6, "{:?}", estimate.theta);
+        assert!(estimate.cost_history.len() <= 20, "{} iterations", estimate.cost_history.len());
+    }
+
     #[test]
     fn a_parameter_without_influence_stays() {
         let function =

@@ -1,6 +1,7 @@
 //! Robust losses as a transformation of residuals, so that the cost stays a sum of squares.
 
 use crate::study::Loss;
+use statrs::statistics::{Data, OrderStatistics};
 
 /// Residuals beyond so many standard deviations count linearly; 95 % efficient for normal noise (Huber-1964).
 const HUBER_LIMIT: f64 = 1.345;
@@ -42,13 +43,8 @@ pub fn original(loss: Loss, s: f64) -> f64 {
 /// Standard deviation of residuals of which some are outliers, from the median of their absolute values (of the residuals
 /// before the transformation).
 pub fn robust_deviation(residuals: impl Iterator<Item = f64>) -> f64 {
-    let mut sizes: Vec<f64> = residuals.map(f64::abs).collect();
-    sizes.sort_by(f64::total_cmp);
-    match sizes.len() {
-        0 => 0.0,
-        count if count % 2 == 1 => MEDIAN_FACTOR * sizes[count / 2],
-        count => MEDIAN_FACTOR * 0.5 * (sizes[count / 2 - 1] + sizes[count / 2]),
-    }
+    let sizes: Vec<f64> = residuals.map(f64::abs).collect();
+    if sizes.is_empty() { 0.0 } else { MEDIAN_FACTOR * Data::new(sizes).median() }
 }
 
 #[cfg(test)]

@@ -83,20 +83,20 @@ impl Bounds {
     }
 
     /// ln(upper / lower): maps the logarithm to `[0,1]`.
-    fn decades(&self, index: usize) -> f64 {
+    fn logarithmic_width(&self, index: usize) -> f64 {
         (self.upper[index] / self.lower[index]).ln()
     }
 
     /// d(theta)/d(coordinate) at `value`, in the coordinate in which the search moves: `[0,1]` between two finite bounds, else the
     /// parameter itself.
     pub(super) fn slope(&self, index: usize, value: f64) -> f64 {
-        if self.is_logarithmic(index) { value * self.decades(index) } else { self.scale(index) }
+        if self.is_logarithmic(index) { value * self.logarithmic_width(index) } else { self.scale(index) }
     }
 
     /// Difference of two values in that coordinate.
     pub(super) fn distance(&self, index: usize, from: f64, to: f64) -> f64 {
         if self.is_logarithmic(index) {
-            (to / from).ln() / self.decades(index)
+            (to / from).ln() / self.logarithmic_width(index)
         } else {
             (to - from) / self.scale(index)
         }
@@ -105,7 +105,7 @@ impl Bounds {
     /// The value at a distance in that coordinate, held within the bounds.
     pub(super) fn moved(&self, index: usize, from: f64, distance: f64) -> f64 {
         let value = if self.is_logarithmic(index) {
-            from * (distance * self.decades(index)).exp()
+            from * (distance * self.logarithmic_width(index)).exp()
         } else {
             from + distance * self.scale(index)
         };

@@ -2,6 +2,7 @@
 
 use super::{ChannelFit, RecordFit};
 use crate::quantities::format_number;
+use statrs::statistics::{Data, OrderStatistics};
 
 /// Discrepancy, %, from which on a channel is looked at.
 const BAD: f64 = 20.0;
@@ -87,12 +88,13 @@ fn likeness(measured: &[f64], simulated: &[f64]) -> Option<(f64, f64)> {
 /// Few samples that stand off far from the others' residuals and make most of the error.
 fn wild(channel: &ChannelFit, time: &[f64]) -> Option<String> {
     let residual: Vec<f64> = channel.measured.iter().zip(&channel.simulated).map(|(m, s)| m - s).collect();
-    let median = |mut values: Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied()
-    };
-    let middle = median(residual.clone())?;
-    let usual = median(residual.iter().map(|r| (r - middle).abs()).collect())? / NORMAL_MEDIAN;
+    let finite: Vec<f64> = residual.iter().copied().filter(|r| r.is_finite()).collect();
+    if finite.is_empty() {
+        return None;
+    }
+    let middle = Data::new(finite.clone()).median();
+    let distances: Vec<f64> = finite.iter().map(|r| (r - middle).abs()).collect();
+    let usual = Data::new(distances).median() / NORMAL_MEDIAN;
     let is_wild = |r: &f64| (r - middle).abs() > WILD * usual;
     let (mut count, mut squares, mut first) = (0usize, 0.0, None);
     for (index, r) in residual.iter().enumerate().filter(|(_, r)| is_wild(r)) {

@@ -170,12 +170,13 @@ impl<'a> Checker<'a> {
         let message = format!("there is no `{}` in this declaration", name.text);
         let mut diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, message)
             .label(name.span, "not declared here")
-            .suggest(similar_name(&name.text, known.iter().map(String::as_str)))
             .note(format!("known here: {}", known.join(", ")));
         if Unit::parse(&name.text).is_ok() {
             let unit = &name.text;
             diagnostic =
-                diagnostic.note(format!("`{unit}` as a unit stands right behind its number: `2 {unit}`, `2 1/{unit}`"));
+                diagnostic.help(format!("`{unit}` as a unit stands right behind its number: `2 {unit}`, `2 1/{unit}`"));
+        } else {
+            diagnostic = diagnostic.suggest(similar_name(&name.text, known.iter().map(String::as_str)));
         }
         self.fail(diagnostic, Scope::Instance(index))
     }

@@ -7,6 +7,7 @@ use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::expression::{Node, Unary};
 use crate::quantities::Dimension;
 use crate::syntax::{ElementPlace, Name};
+use nalgebra::Vector3;
 
 impl<'a> Checker<'a> {
     /// What presses the sides of a joint on each other, for effects that rub there: the size of the force that it transmits, of a
@@ -52,16 +53,11 @@ impl<'a> Checker<'a> {
         if read.freedom.rotation.is_some() || is_turned {
             return None;
         }
-        let smallest = (0..3).min_by(|&a, &b| axis[a].abs().total_cmp(&axis[b].abs()))?;
-        let mut helper = [0.0; 3];
-        helper[smallest] = 1.0;
-        let cross = |a: [f64; 3], b: [f64; 3]| {
-            let product = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-            let length = product.iter().map(|value| value * value).sum::<f64>().sqrt();
-            product.map(|value| value / length)
-        };
-        let first = cross(axis, helper);
-        Some(vec![first, cross(axis, first)])
+        let axis = Vector3::from(axis);
+        let mut helper = Vector3::zeros();
+        helper[axis.iamin()] = 1.0;
+        let first = axis.cross(&helper).normalize();
+        Some(vec![first.into(), axis.cross(&first).normalize().into()])
     }
 
     fn reaction_component(&mut self, joint: usize, owner: &str, axis: usize, span: Span) -> Node {

@@ -140,6 +140,7 @@ impl Model {
         prologue.extend(assembler.take_copies());
         let constant_end = assembler.constants.len();
         let mut registers = assembler.constants;
+        // Kernels read whole blocks: the last may reach beyond the last register.
         registers.resize(assembler.next + LANES, 0.0);
         debug_assert_eq!(p, system.parameter_names.len());
         Model {

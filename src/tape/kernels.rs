@@ -104,9 +104,9 @@ impl Operand for Listed {
     unsafe fn block(self, index: usize) -> Block {
         // SAFETY: lists are as long as the blocks of their run and name registers of the file.
         let list = unsafe { self.list.add(LANES * index).cast::<[u32; LANES]>().read() };
-        // SAFETY: the same.
         let mut block = [0.0; LANES];
         for lane in 0..LANES {
+            // SAFETY: the same.
             block[lane] = unsafe { *self.registers.add(list[lane] as usize) };
         }
         block
@@ -221,8 +221,8 @@ impl Kernel<'_> {
 
     #[inline(always)]
     fn map_one(self, function: impl Fn(f64) -> f64 + Copy) {
-        // SAFETY: `store` asks for the run's blocks.
         with_operand!(self, 0, a => self.store(#[inline(always)] |index| {
+            // SAFETY: `store` asks for the run's blocks.
             let a = unsafe { a.block(index) };
             let mut results = [0.0; LANES];
             for lane in 0..LANES {

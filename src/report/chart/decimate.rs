@@ -1,5 +1,7 @@
 //! Long curves made short without losing their peaks.
 
+use statrs::statistics::{Data, OrderStatistics};
+
 /// Minimum and maximum per bucket of `size` samples, in the order in which they occur: two values per bucket.
 ///
 /// A bucket without finite values yields two NaN (a gap). With `size` below 3 the curve is returned as it is.
@@ -37,13 +39,8 @@ pub fn median_by_bin(x: &[f64], y: &[f64], bins: usize, least: usize) -> Vec<(f6
         members[bin].push(y);
     }
     let centre = |bin: usize| low + (bin as f64 + 0.5) * width;
-    let median = |mut values: Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        let middle = values.len() / 2;
-        if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
-    };
     let filled = members.into_iter().enumerate().filter(|(_, values)| values.len() >= least.max(1));
-    filled.map(|(bin, values)| (centre(bin), median(values))).collect()
+    filled.map(|(bin, values)| (centre(bin), Data::new(values).median())).collect()
 }
 
 #[cfg(test)]
