@@ -350,6 +350,12 @@ codes! {
      unit of time. It can neither be identified nor change.\n\
      Write `every 1 ms { .. }`, or bind the law's parameter to a number.\n"
 
+    NOMINAL_SIZE "E0265" "nominal size of a state"
+    "`nominal` says how large a state usually is; near zero its error is measured by that. Without it the size follows from the\n\
+     unit, which is far off for concentrations of 1e-20 or pressures of 1e7 in SI units. It is known before the simulation: a\n\
+     positive number of the state's dimension, neither identified nor changing.\n\
+     Write `state z: ratio from 0 nominal 1e-20 { .. }`.\n"
+
     EVENT_TARGET "E0262" "not changed by events"
     "An event changes states of its own law, and at a joint or force element the rate `v` (by an impulse along the element).\n\
      Positions follow from rates; ports and parameters are given from outside.\n\

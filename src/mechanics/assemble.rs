@@ -176,7 +176,10 @@ fn state_variables(study: &Study, tree: &Tree, moving: &[usize]) -> Vec<Variable
             | Coordinate::Follower { .. } => {}
         }
     }
-    let laws = study.states.iter().map(|state| variable(state.symbol, state.dimension, VariableKind::Law, 0.0));
+    let laws = study.states.iter().map(|state| {
+        let usual = variable(state.symbol, state.dimension, VariableKind::Law, 0.0);
+        Variable { scale: state.nominal.unwrap_or(usual.scale), ..usual }
+    });
     positions.into_iter().chain(velocities).chain(laws).collect()
 }
 

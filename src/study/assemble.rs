@@ -4,6 +4,7 @@ use super::channels::text_of;
 use super::checker::{Allowed, Checker, Scope, Site};
 use super::declarations::Declarations;
 use super::model::{Force, ForcePlace, Signal, State, Study};
+use super::trial::CheckedState;
 use crate::diagnostics::{Code, Diagnostic};
 use crate::expression::{Graph, Node, Operation, Symbol};
 use crate::syntax::ElementRole;
@@ -202,13 +203,14 @@ impl<'a> Checker<'a> {
         for index in 0..self.instances.len() {
             let declarations = self.instances[index].states;
             for (at, checked) in self.check_states(index, declarations).into_iter().enumerate() {
-                let Some((symbol, initial, derivative)) = checked else { continue };
+                let Some(CheckedState { symbol, initial, derivative, nominal }) = checked else { continue };
                 let name = self.instances[index].state_name(at);
                 states.push(State {
                     symbol: self.graph.symbol(&name),
                     name,
                     derivative: derivative.node,
                     initial: initial.node,
+                    nominal,
                     dimension: symbol.dimension,
                     span: declarations[at].name.span,
                 });
@@ -220,6 +222,7 @@ impl<'a> Checker<'a> {
                 symbol: sensor.symbol,
                 derivative: sensor.derivative,
                 initial: sensor.initial,
+                nominal: None,
                 dimension: sensor.dimension,
                 span: sensor.span,
             });

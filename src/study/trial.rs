@@ -10,6 +10,15 @@ use crate::diagnostics::{Code, Diagnostic};
 use crate::quantities::Dimension;
 use crate::syntax::{Declared, EffectAction, EffectDeclaration, Expression, LawDeclaration, Name, StateDeclaration};
 
+/// A state of an instance, its expressions of the right dimensions.
+pub(super) struct CheckedState {
+    pub symbol: Typed,
+    pub initial: Typed,
+    pub derivative: Typed,
+    /// Typical size (SI), where it is stated.
+    pub nominal: Option<f64>,
+}
+
 /// A dimension that no other quantity has: a law for any `value` must not depend on what it is.
 const ANY_VALUE: Dimension = Dimension::new(3, -5, 7, 2, -3);
 
@@ -162,14 +171,15 @@ impl<'a> Checker<'a> {
         self.check_states(index, states);
     }
 
-    /// Derivatives and start values of all states of an instance have the right dimension; the nodes of both.
-    pub fn check_states(&mut self, index: usize, states: &'a [StateDeclaration]) -> Vec<Option<(Typed, Typed, Typed)>> {
+    /// Derivatives, start values and nominal sizes of all states of an instance have the right dimension; what they are.
+    pub fn check_states(&mut self, index: usize, states: &'a [StateDeclaration]) -> Vec<Option<CheckedState>> {
         let scope = Scope::Instance(index);
         let check = |checker: &mut Self, at: usize, state: &'a StateDeclaration| {
             let symbol = checker.state(index, at, state.name.span);
             let initial = checker.evaluate(&state.initial, scope);
             let derivative = state.derivative.as_ref().map(|written| (checker.evaluate(written, scope), written.span));
             let symbol = symbol?;
+            let nominal = state.nominal.as_ref().and_then(|written| checker.nominal(index, written, state, symbol));
             let because = format!("state `{}` has", state.name.text);
             let initial =
                 checker.expect(initial?, state.initial.span, symbol.dimension, (state.name.span, &because), scope);
@@ -179,8 +189,34 @@ impl<'a> Checker<'a> {
                 Some((value, span)) => checker.expect(value?, span, rate, (state.name.span, &because), scope),
                 None => Some(Typed::new(checker.graph.constant(0.0), rate)),
             };
-            Some((symbol, initial?, derivative?))
+            Some(CheckedState { symbol, initial: initial?, derivative: derivative?, nominal })
         };
         states.iter().enumerate().map(|(at, state)| check(self, at, state)).collect()
+    }
+
+    fn nominal(
+        &mut self,
+        index: usize,
+        written: &'a Expression,
+        state: &'a StateDeclaration,
+        symbol: Typed,
+    ) -> Option<f64> {
+        let scope = Scope::Instance(index);
+        let value = self.evaluate(written, scope)?;
+        let because = format!("state `{}` has", state.name.text);
+        let value = self.expect(value, written.span, symbol.dimension, (state.name.span, &because), scope)?;
+        let is_trial = matches!(self.instances[index].site, Site::Trial(_));
+        match self.graph.constant_value(value.node) {
+            Some(size) if size > 0.0 && size.is_finite() => Some(size),
+            // Imagined ports have no value.
+            None if is_trial => None,
+            _ => {
+                let message = format!("the nominal size of `{}` must be a fixed positive number", state.name.text);
+                let diagnostic = Diagnostic::error(Code::NOMINAL_SIZE, message)
+                    .label(written.span, "not known before the simulation, or not positive")
+                    .help("write the usual size as a number, with its unit where it has one: `nominal 1e-12`");
+                self.fail(diagnostic, scope)
+            }
+        }
     }
 }

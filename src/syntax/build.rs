@@ -109,6 +109,7 @@ fn is_keyword(rule: Rule) -> bool {
             | of_word
             | in_word
             | from_word
+            | nominal_word
             | prior_word
             | at_word
             | any_word

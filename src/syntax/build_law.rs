@@ -201,8 +201,9 @@ impl Builder<'_> {
             None => None,
         };
         let initial = self.expression(parts.next()?);
+        let nominal = parts.take(Rule::expression).map(|pair| self.expression(pair));
         let Some(derivative_name) = parts.next() else {
-            return Some(StateDeclaration { name, kind, initial, derivative: None, span });
+            return Some(StateDeclaration { name, kind, initial, nominal, derivative: None, span });
         };
         let derivative_name = self.name(derivative_name.into_inner().next()?);
         let derivative = Some(self.expression(parts.next()?));
@@ -213,7 +214,7 @@ impl Builder<'_> {
                 .secondary(name.span, "the state");
             self.diagnostics.push(finding);
         }
-        Some(StateDeclaration { name, kind, initial, derivative, span })
+        Some(StateDeclaration { name, kind, initial, nominal, derivative, span })
     }
 
     pub fn event(&mut self, mut parts: Parts<'_>, span: Span) -> Built<EventDeclaration> {

@@ -468,6 +468,7 @@ fn keyword(rule: Rule) -> Option<&'static str> {
         Rule::per_word | Rule::per_experiment => "per",
         Rule::constrain_word | Rule::constrain => "constrain",
         Rule::from_word => "from",
+        Rule::nominal_word => "nominal",
         Rule::prior_word => "prior",
         Rule::at_word => "at",
         Rule::any_word => "any",

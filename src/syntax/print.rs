@@ -411,7 +411,8 @@ fn state(state: &StateDeclaration) -> String {
     let kind = state.kind.as_ref().map(|kind| format!(": {}", type_text(kind))).unwrap_or_default();
     let (name, initial) = (&state.name.text, print_expression(&state.initial));
     let derivative = state.derivative.as_ref().map(|value| format!(" {{ {name}' = {} }}", print_expression(value)));
-    format!("state {name}{kind} from {initial}{}", derivative.unwrap_or_default())
+    let nominal = state.nominal.as_ref().map(|value| format!(" nominal {}", print_expression(value)));
+    format!("state {name}{kind} from {initial}{}{}", nominal.unwrap_or_default(), derivative.unwrap_or_default())
 }
 
 fn event(event: &EventDeclaration) -> String {

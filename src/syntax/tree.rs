@@ -236,6 +236,8 @@ pub struct StateDeclaration {
     pub name: Name,
     pub kind: Option<TypeExpression>,
     pub initial: Expression,
+    /// Typical size of the state, which its error is measured by near zero.
+    pub nominal: Option<Expression>,
     /// None: the state keeps its value between events.
     pub derivative: Option<Expression>,
     pub span: Span,

@@ -244,6 +244,29 @@ fn branches_with_dampers_settle_to_their_complex_stiffness() {
     agree("relaxing_spring", &history("relaxing_spring", fields), &both);
 }
 
+/// A trace of 1e-20 decays over an intermediate: b = a_0 (exp(-t) - exp(-2 t)). By its unit the error of a ratio is measured by 1e-4
+/// near zero, and the trace would pass for nothing.
+#[test]
+fn states_far_from_their_unit_state_their_nominal_size() {
+    let errors = ["", " nominal 1e-20"].map(|nominal| {
+        let study = study(&format!(
+            "study s\nlaw decay() -> ratio {{\n\
+             state a: ratio from 1e-20{nominal} {{ a' = -1 1/s * a }}\n\
+             state b: ratio from 0{nominal} {{ b' = 1 1/s * a - 2 1/s * b }}\n = b }}\n\
+             signal trace: decay {{}}\nmeasure b [1] = trace\nmanoeuvre m {{ start = rest, for 4 s }}\n\
+             solver {{ tolerance = 1e-8 }}"
+        ));
+        let record = excitation(&study, 0, STEP);
+        let compiled = Compiled::new(study).unwrap_or_else(|findings| panic!("{findings:?}"));
+        let run = simulate(&compiled, &record, &[], Gradient::None).unwrap_or_else(|failure| panic!("{failure}"));
+        let exact = |k: usize| (-(k as f64) * STEP).exp() - (-2.0 * k as f64 * STEP).exp();
+        let deviations = run.channels[0].iter().enumerate().map(|(k, b)| (1e20 * b - exact(k)).abs());
+        deviations.fold(0.0, f64::max)
+    });
+    assert!(errors[1] < 1e-7, "{errors:?}");
+    assert!(errors[0] > 1e-4, "the size makes no difference: {errors:?}");
+}
+
 /// The sharpness can be identified: its derivative is finite where the state passes zero.
 #[test]
 fn the_sharpness_of_a_hysteresis_has_a_gradient() {

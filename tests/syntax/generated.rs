@@ -86,8 +86,11 @@ fn declared() -> impl Strategy<Value = String> {
 }
 
 fn state() -> impl Strategy<Value = String> {
-    (name(), types(), expression(), expression())
-        .prop_map(|(name, kind, start, slope)| format!("state {name}: {kind} from {start} {{ {name}' = {slope} }}"))
+    (name(), types(), expression(), expression()).prop_map(|(name, kind, start, slope)| {
+        // Half of them state their size.
+        let nominal = if name.len() % 2 == 0 { format!(" nominal {start}") } else { String::new() };
+        format!("state {name}: {kind} from {start}{nominal} {{ {name}' = {slope} }}")
+    })
 }
 
 fn law() -> impl Strategy<Value = String> {

@@ -210,6 +210,8 @@ pub struct State {
     pub derivative: Node,
     /// Value at the start when the experiment starts from rest; equilibrium replaces it.
     pub initial: Node,
+    /// Typical size (SI) where the study states it; else it follows from the dimension.
+    pub nominal: Option<f64>,
     pub dimension: Dimension,
     pub span: Span,
 }

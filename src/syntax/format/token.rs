@@ -37,9 +37,9 @@ pub(super) struct Token<'a> {
 }
 
 /// Words after which no operand has been read, so that a minus belongs to what follows.
-const JOINING: [&str; 17] = [
+const JOINING: [&str; 18] = [
     "if", "then", "else", "and", "or", "in", "from", "prior", "by", "of", "along", "on", "adds", "neutral", "for",
-    "when", "every",
+    "when", "every", "nominal",
 ];
 
 pub(super) fn tokens(text: &str) -> Vec<Token<'_>> {
