@@ -18,6 +18,8 @@ const SMALLEST_FACTOR: f64 = 0.2;
 const LARGEST_FACTOR: f64 = 10.0;
 /// A step whose result is not finite is retried at this share.
 const RETREAT: f64 = 0.1;
+/// A step over a kink at which it cannot end is retried at this share.
+const RETREAT_FROM_KINK: f64 = 0.5;
 /// Step and largest eigenvalue, as found from the last two stages, together indicate stiffness above this share of the
 /// stability bound (Hairer-Wanner-1996, IV.2).
 const NEAR_STABILITY: f64 = 0.94;
@@ -146,7 +148,7 @@ impl RungeKutta {
             last_step: 0.0,
             next_step: 0.0,
             last_error: 1e-4,
-            norm,
+            norm: norm.by_amplitude(),
             stages: std::array::from_fn(|_| vec![0.0; length]),
             has_dense_stages: false,
             before: vec![0.0; length],
@@ -230,6 +232,7 @@ impl RungeKutta {
         self.begin(system, branches);
         let mut rejected = false;
         let mut aim: Option<Aim> = None;
+        let mut has_missed = false;
         loop {
             let (step, reaches_end) = limits.fit(self.next_step, self.time, end);
             limits.check(system, self.time, step, end, self.trouble)?;
@@ -245,7 +248,7 @@ impl RungeKutta {
             self.attempts += 1;
             let error = self.measure(step);
             if error.norm > 1.0 || error.norm.is_nan() {
-                aim = None;
+                has_missed |= aim.take().is_some();
                 rejected = true;
                 self.rejections += 1;
                 system.work.rejected_error += 1;
@@ -253,26 +256,33 @@ impl RungeKutta {
                 continue;
             }
             match &mut aim {
-                Some(aim) => {
-                    if let Some(share) = self.correction(system, aim, step) {
+                Some(aimed) => {
+                    if let Some(share) = self.correction(system, aimed, step) {
                         system.work.rejected_error += 1;
+                        let whole = aimed.step;
                         self.next_step = share * step;
+                        if self.next_step > whole {
+                            // Moved out of the step that crossed it: the solution hardly touches it.
+                            (self.next_step, aim) = (RETREAT_FROM_KINK * whole, None);
+                            self.free(system);
+                        }
                         continue;
                     }
-                    self.next_step = aim.step;
-                    self.beyond = Some(aim.kink.beyond.clone());
+                    self.next_step = aimed.step;
+                    self.beyond = Some(aimed.kink.beyond.clone());
                 }
                 None => match self.crossing(system, step) {
-                    Crossing::At(kink, jump) => {
+                    Crossing::At(kink, jump) if !has_missed => {
                         system.work.rejected_error += 1;
                         self.next_step = kink.share * step;
                         aim = Some(Aim { kink, step, jump, corrections: crossing::MOST_CORRECTIONS });
                         continue;
                     }
-                    Crossing::Unclear => {
+                    // Met again after an attempt to end at it failed: values decide, or it would come back without end.
+                    Crossing::Unclear | Crossing::At(..) => {
                         system.work.rejected_error += 1;
                         self.free(system);
-                        self.next_step = 0.5 * step;
+                        self.next_step = RETREAT_FROM_KINK * step;
                         continue;
                     }
                     Crossing::Harmless(beyond) => {
