@@ -123,6 +123,18 @@ fn eliminate_block<const W: usize>(first: usize, ((columns, values), x, width, p
     }
 }
 
+/// `x_target -= value x_source` for all entries (target, source), one after the other.
+pub(super) fn eliminate_entries(entries: &[[u32; 2]], values: &[f64], x: &mut [f64]) {
+    eliminate_all_entries(entries, values, x);
+}
+
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn eliminate_all_entries(entries: &[[u32; 2]], values: &[f64], x: &mut [f64]) {
+    for (&[target, source], value) in entries.iter().zip(values) {
+        x[target as usize] = (-value).mul_add(x[source as usize], x[target as usize]);
+    }
+}
+
 /// `out = base + factor sum_s coefficient_s vectors[index_s]` for the listed (index, coefficient).
 ///
 /// # Panics

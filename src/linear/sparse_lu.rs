@@ -5,7 +5,7 @@
 use super::dense_block::DenseBlock;
 use super::factorisation::SingularMatrix;
 use super::pattern::SparsityPattern;
-use super::products::{TriangularRows, eliminate_rows};
+use super::products::{TriangularRows, eliminate_entries, eliminate_rows};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
@@ -114,8 +114,8 @@ impl SparseLu {
             self.plan_passes();
             self.has_structure = true;
         }
-        self.forward.take_values(&self.lower);
-        self.backward.take_values(&self.upper);
+        self.forward.take_values(&self.lower, None);
+        self.backward.take_values(&self.upper, Some(&self.inverse_pivot));
         Ok(())
     }
 
@@ -338,8 +338,13 @@ impl SparseLu {
             }
         }
         if width == 1 {
-            self.forward.run_one(&mut self.block, None);
-            self.backward.run_one(&mut self.block, Some(&self.inverse_pivot));
+            self.forward.run_scattered(&mut self.block);
+            self.forward.run_dense(&mut self.block, None);
+            self.backward.run_dense(&mut self.block, Some(&self.inverse_pivot));
+            for (value, inverse) in self.block.iter_mut().zip(&self.inverse_pivot[..self.tail]) {
+                *value *= inverse;
+            }
+            self.backward.run_scattered(&mut self.block);
         } else {
             eliminate_rows(self.forward.rows(), &mut self.block, width, None);
             self.dense.solve(&mut self.block[self.tail * width..], width);
@@ -356,35 +361,38 @@ impl SparseLu {
         let tail = self.tail;
         let mut is_reached: Vec<bool> = self.pivot_row.iter().map(|&row| row < self.wanted).collect();
         self.forward.clear();
-        let mut by_row: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
+        let mut entries = Vec::new();
         for k in 0..n {
             if is_reached[k] {
                 for l in self.lower.column(k) {
                     is_reached[self.lower.positions[l]] = true;
-                    if k < tail {
-                        by_row[self.lower.positions[l]].push((k as u32, l as u32));
-                    }
                 }
-                let dense = if k >= tail { k + 1..n } else { 0..0 };
-                self.forward.add(k, self.lower.column(k).map(|l| (self.lower.positions[l], l)), dense);
+                let column = self.lower.column(k).map(|l| (self.lower.positions[l], l));
+                if k < tail {
+                    entries.extend(column.map(|(target, from)| Entry { target, source: k, from }));
+                } else {
+                    self.forward.add_dense(k, column, k + 1..n);
+                }
             }
         }
-        self.forward.add_rows(by_row.into_iter().enumerate().filter(|(_, entries)| !entries.is_empty()));
+        self.forward.add_rows(by_target(&entries, 0..n).filter(|(_, entries)| !entries.is_empty()));
+        self.forward.add_scattered(entries);
         let mut is_needed: Vec<bool> = self.columns.iter().map(|&column| column < self.wanted).collect();
         for k in 0..n {
             is_needed[k] |= k >= tail || self.upper.column(k).any(|u| is_needed[self.upper.rows[u]]);
         }
         self.backward.clear();
-        let mut by_row: Vec<Vec<(u32, u32)>> = vec![Vec::new(); n];
+        let mut entries = Vec::new();
         for k in (0..n).rev().filter(|&k| is_needed[k]) {
-            for u in self.upper.column(k).filter(|&u| self.upper.rows[u] < tail && is_needed[self.upper.rows[u]]) {
-                by_row[self.upper.rows[u]].push((k as u32, u as u32));
+            let column = self.upper.column(k).map(|u| (self.upper.rows[u], u)).filter(|(row, _)| is_needed[*row]);
+            let (near, far): (Vec<_>, Vec<_>) = column.partition(|(row, _)| *row < tail);
+            entries.extend(near.into_iter().map(|(target, from)| Entry { target, source: k, from }));
+            if k >= tail {
+                self.backward.add_dense(k, far.into_iter(), tail..k);
             }
-            let entries = self.upper.column(k).map(|u| (self.upper.rows[u], u));
-            let dense = if k >= tail { tail..k } else { 0..0 };
-            self.backward.add(k, entries.filter(|(row, _)| is_needed[*row]), dense);
         }
-        self.backward.add_rows(by_row.into_iter().enumerate().take(tail).rev().filter(|(row, _)| is_needed[*row]));
+        self.backward.add_rows(by_target(&entries, (0..tail).rev()).filter(|(row, _)| is_needed[*row]));
+        self.backward.add_scattered(entries);
     }
 
     /// First position from which on both factors together are mostly full.
@@ -413,15 +421,35 @@ fn serves(pivot: f64, largest: f64) -> bool {
     pivot.abs() > SINGULAR && pivot.abs() >= REUSE_PIVOT * largest && largest.is_finite()
 }
 
-/// The entries of a triangular factor in the order in which a solution reads them.
+/// An entry of a triangular factor: the value at `source`, when it is final, is subtracted from `target`.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    target: usize,
+    source: usize,
+    /// Index in the triangle.
+    from: usize,
+}
+
+/// Targets in the order given, each with (source, index in the triangle) of its entries.
+fn by_target(entries: &[Entry], order: impl Iterator<Item = usize>) -> impl Iterator<Item = (usize, Vec<(u32, u32)>)> {
+    let count = entries.iter().map(|entry| entry.target + 1).max().unwrap_or(0);
+    let mut rows = vec![Vec::new(); count];
+    for entry in entries {
+        rows[entry.target].push((entry.source as u32, entry.from as u32));
+    }
+    order.map(move |position| (position, rows.get_mut(position).map(std::mem::take).unwrap_or_default()))
+}
+
+/// A triangular factor in the order in which a solution reads it.
 #[derive(Clone, Debug, Default)]
 struct Pass {
-    sources: Vec<Source>,
-    targets: Vec<u32>,
-    /// Index of each scattered entry in its triangle.
+    /// For one right-hand side: (target, source) of the entries outside the dense block, sources before what depends on them and
+    /// entries that do not wait for each other side by side.
+    scattered: Vec<[u32; 2]>,
     from: Vec<u32>,
     values: Vec<f64>,
-    /// The same for entries of dense ranges, `ABSENT` for zeros.
+    /// Columns of the dense block, and the indices of their entries in the triangle, `ABSENT` for zeros.
+    sources: Vec<Source>,
     dense_from: Vec<u32>,
     dense_values: Vec<f64>,
     /// The rows that a block of right-hand sides needs outside the dense block, as [`TriangularRows`], and where their values come
@@ -432,14 +460,12 @@ struct Pass {
     row_values: Vec<f64>,
 }
 
-/// A position whose value is subtracted from others: scattered ones, and a range without gaps.
+/// A position of the dense block whose value is subtracted from a range without gaps.
 #[derive(Clone, Copy, Debug)]
 struct Source {
     position: u32,
-    /// End of its scattered entries.
-    end: u32,
-    dense_begin: u32,
-    dense_length: u32,
+    begin: u32,
+    length: u32,
 }
 
 const ABSENT: u32 = u32::MAX;
@@ -449,28 +475,45 @@ impl Pass {
         *self = Self::default();
     }
 
-    fn add(&mut self, position: usize, entries: impl Iterator<Item = (usize, usize)>, dense: Range<usize>) {
+    fn add_dense(&mut self, position: usize, entries: impl Iterator<Item = (usize, usize)>, range: Range<usize>) {
         let first = self.dense_from.len();
-        self.dense_from.resize(first + dense.len(), ABSENT);
+        self.dense_from.resize(first + range.len(), ABSENT);
         for (target, from) in entries {
-            if dense.contains(&target) {
-                self.dense_from[first + target - dense.start] = from as u32;
-            } else {
-                self.targets.push(target as u32);
-                self.from.push(from as u32);
-            }
+            self.dense_from[first + target - range.start] = from as u32;
         }
-        self.sources.push(Source {
-            position: position as u32,
-            end: self.targets.len() as u32,
-            dense_begin: dense.start as u32,
-            dense_length: dense.len() as u32,
-        });
+        let (begin, length) = (range.start as u32, range.len() as u32);
+        self.sources.push(Source { position: position as u32, begin, length });
     }
 
-    fn take_values(&mut self, triangle: &Triangle) {
+    /// Entries whose sources come in an order in which they can be eliminated.
+    fn add_scattered(&mut self, entries: Vec<Entry>) {
+        let count = entries.iter().map(|entry| entry.target.max(entry.source) + 1).max().unwrap_or(0);
+        // How many entries must follow one after the other before a position is final.
+        let mut depth = vec![0_usize; count];
+        for entry in &entries {
+            depth[entry.target] = depth[entry.target].max(depth[entry.source] + 1);
+        }
+        // Entries of the same depth meet at a target in turns.
+        let mut met = std::collections::HashMap::new();
+        let mut order: Vec<(usize, usize, Entry)> = entries
+            .into_iter()
+            .map(|entry| {
+                let turn: &mut usize = met.entry((depth[entry.source], entry.target)).or_default();
+                *turn += 1;
+                (depth[entry.source], *turn, entry)
+            })
+            .collect();
+        order.sort_by_key(|(depth, turn, _)| (*depth, *turn));
+        self.scattered = order.iter().map(|(_, _, entry)| [entry.target as u32, entry.source as u32]).collect();
+        self.from = order.iter().map(|(_, _, entry)| entry.from as u32).collect();
+    }
+
+    /// Takes the numbers of a factorisation; those of scattered entries times the inverse pivots of their targets, where given.
+    fn take_values(&mut self, triangle: &Triangle, inverse_pivot: Option<&[f64]>) {
+        let factor = |target: u32| inverse_pivot.map_or(1.0, |inverse| inverse[target as usize]);
+        let places = self.scattered.iter().zip(&self.from);
         self.values.clear();
-        self.values.extend(self.from.iter().map(|&from| triangle.values[from as usize]));
+        self.values.extend(places.map(|([target, _], &from)| triangle.values[from as usize] * factor(*target)));
         let value = |&from: &u32| if from == ABSENT { 0.0 } else { triangle.values[from as usize] };
         self.dense_values.clear();
         self.dense_values.extend(self.dense_from.iter().map(value));
@@ -487,26 +530,20 @@ impl Pass {
         }
     }
 
-    fn run_one(&self, x: &mut [f64], inverse_pivot: Option<&[f64]>) {
-        let (mut start, mut dense) = (0, 0);
+    fn run_scattered(&self, x: &mut [f64]) {
+        eliminate_entries(&self.scattered, &self.values, x);
+    }
+
+    fn run_dense(&self, x: &mut [f64], inverse_pivot: Option<&[f64]>) {
+        let mut rest = self.dense_values.as_slice();
         for source in &self.sources {
-            let (position, end) = (source.position as usize, source.end as usize);
-            let (length, begin) = (source.dense_length as usize, source.dense_begin as usize);
-            let entries = self.targets[start..end].iter().zip(&self.values[start..end]);
-            let factors = &self.dense_values[dense..dense + length];
-            start = end;
-            dense += length;
-            let mut value = x[position];
-            if value == 0.0 {
-                continue;
-            }
+            let (position, begin, length) = (source.position as usize, source.begin as usize, source.length as usize);
+            let (factors, others) = rest.split_at(length);
+            rest = others;
             if let Some(inverse) = inverse_pivot {
-                value *= inverse[position];
-                x[position] = value;
+                x[position] *= inverse[position];
             }
-            for (&target, factor) in entries {
-                x[target as usize] -= factor * value;
-            }
+            let value = x[position];
             for (target, factor) in x[begin..begin + length].iter_mut().zip(factors) {
                 *target -= factor * value;
             }
