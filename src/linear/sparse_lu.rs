@@ -328,6 +328,9 @@ impl SparseLu {
     }
 
     pub fn solve_block(&mut self, x: &mut [f64], width: usize) {
+        if width == 1 {
+            return self.solve_one(x);
+        }
         let n = self.columns.len();
         self.block.clear();
         self.block.resize(n * width, 0.0);
@@ -337,21 +340,29 @@ impl SparseLu {
                 *a = b * scale;
             }
         }
-        if width == 1 {
-            self.forward.run_scattered(&mut self.block);
-            self.forward.run_dense(&mut self.block, None);
-            self.backward.run_dense(&mut self.block, Some(&self.inverse_pivot));
-            for (value, inverse) in self.block.iter_mut().zip(&self.inverse_pivot[..self.tail]) {
-                *value *= inverse;
-            }
-            self.backward.run_scattered(&mut self.block);
-        } else {
-            eliminate_rows(self.forward.rows(), &mut self.block, width, None);
-            self.dense.solve(&mut self.block[self.tail * width..], width);
-            eliminate_rows(self.backward.rows(), &mut self.block, width, Some(&self.inverse_pivot));
-        }
+        eliminate_rows(self.forward.rows(), &mut self.block, width, None);
+        self.dense.solve(&mut self.block[self.tail * width..], width);
+        eliminate_rows(self.backward.rows(), &mut self.block, width, Some(&self.inverse_pivot));
         for (k, &column) in self.columns.iter().enumerate().filter(|(_, column)| **column < self.wanted) {
             x[column * width..(column + 1) * width].copy_from_slice(&self.block[k * width..(k + 1) * width]);
+        }
+    }
+
+    fn solve_one(&mut self, x: &mut [f64]) {
+        let given = |row: &usize| if *row < self.wanted { x[*row] * self.row_scale[*row] } else { 0.0 };
+        self.block.clear();
+        self.block.extend(self.pivot_row.iter().map(given));
+        self.forward.run_scattered(&mut self.block);
+        self.forward.run_dense(&mut self.block, None);
+        self.backward.run_dense(&mut self.block, Some(&self.inverse_pivot));
+        for (value, inverse) in self.block.iter_mut().zip(&self.inverse_pivot[..self.tail]) {
+            *value *= inverse;
+        }
+        self.backward.run_scattered(&mut self.block);
+        for (&column, value) in self.columns.iter().zip(&self.block) {
+            if column < self.wanted {
+                x[column] = *value;
+            }
         }
     }
 
