@@ -1,9 +1,10 @@
-//! P1 and P2 as studies: one call of the rates, nominal run and gradient at the tolerance that reaches the error asked for.
+//! P1 and P2 as studies: one call of the rates, nominal run and gradient at the tolerance that reaches the error asked
+//! for.
 //!
-//! `cargo bench --bench problems` prints achieved errors (against a run of the same study at tolerance 1e-10) and medians. The
-//! peers' figures are those of `../shared/bench`, measured on another occasion: ratios across machines are rough. With the
-//! environment variable `IDENT_PEERS` set to a prepared copy of the peers' scripts, they run in turn with the own runs; on one
-//! core (`taskset -c 0 cargo bench --bench problems`) both find it in the same condition.
+//! `cargo bench --bench problems` prints achieved errors (against a run of the same study at tolerance 1e-10) and
+//! medians. The peers' figures are those of `../shared/bench`, measured on another occasion: ratios across machines are
+//! rough. With the environment variable `IDENT_PEERS` set to a prepared copy of the peers' scripts, they run in turn
+//! with the own runs; on one core (`taskset -c 0 cargo bench --bench problems`) both find it in the same condition.
 
 #[path = "support/peer.rs"]
 mod peer;
@@ -49,8 +50,8 @@ fn error_of_sensitivities(own: &Trajectory, reference: &Trajectory, theta: &[f64
     worst
 }
 
-/// Tolerances of the references, far below the errors asked for. Slope jumps of the dampers are kinks of the sensitivities, at
-/// which explicit steps at tight tolerances become very short.
+/// Tolerances of the references, far below the errors asked for. Slope jumps of the dampers are kinks of the
+/// sensitivities, at which explicit steps at tight tolerances become very short.
 const REFERENCE: f64 = 1e-10;
 const GRADIENT_REFERENCE: f64 = 1e-8;
 

@@ -1,7 +1,7 @@
 //! How the tool grows with the mechanism: from text to tapes, per evaluation, per simulated second.
 //!
-//! `cargo bench --bench scale` prints one table per family. Medians of several runs on one thread; resident memory of the whole
-//! process after compilation.
+//! `cargo bench --bench scale` prints one table per family. Medians of several runs on one thread; resident memory of
+//! the whole process after compilation.
 
 mod generated;
 mod support;

@@ -1,5 +1,5 @@
-//! Coverage of the 95 % intervals and bias of the noise variances over many repeated identifications of three shipped studies: white
-//! noise, behind a prefilter, coloured noise.
+//! Coverage of the 95 % intervals and bias of the noise variances over many repeated identifications of three shipped
+//! studies: white noise, behind a prefilter, coloured noise.
 //!
 //! ```sh
 //! cargo run --release --example coverage -- 2000

@@ -1,6 +1,6 @@
-//! Speed-up by threads: several searches, several experiments, Monte Carlo samples, on one thread and on all. The digits are the
-//! same, which is checked on the way. Medians of a few rounds in which one thread and all take turns, so that what else the machine
-//! does meets both alike.
+//! Speed-up by threads: several searches, several experiments, Monte Carlo samples, on one thread and on all. The
+//! digits are the same, which is checked on the way. Medians of a few rounds in which one thread and all take turns, so
+//! that what else the machine does meets both alike.
 //!
 //! ```sh
 //! cargo run --release --example speedup

@@ -38,7 +38,8 @@ fn text(path: &Path) -> &str {
     path.to_str().expect("a path")
 }
 
-/// A long search is ended from outside, as by Ctrl-C (whose signal programs in the background are told to ignore): its file holds the best so far, whole, and a later run goes on from there.
+/// A long search is ended from outside, as by Ctrl-C (whose signal programs in the background are told to ignore): its
+/// file holds the best so far, whole, and a later run goes on from there.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_fit_is_resumed() {
@@ -185,7 +186,8 @@ const CAUTIOUS: &str = "study cautious\n\
     manoeuvre turn { for 1 s, start = rest { crank_1.position = 1 rad, crank_2.position = 1 rad, crank_1.velocity = 4 rad/s } }\n\
     criterion most [mm] = max(guide.position) in turn { below = 11 mm }\n";
 
-/// What a simulation neglects or leaves to chance is told by every command that simulates, before it goes on to longer work.
+/// What a simulation neglects or leaves to chance is told by every command that simulates, before it goes on to longer
+/// work.
 #[test]
 fn cautions_reach_every_command() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -55,7 +55,8 @@ fn gradients_of_closed_loops_are_those_of_the_discrete_solution() {
     assert!(digits > 8.0, "{digits} digits");
 }
 
-/// A mass between a soft and a hard spring: the slope of its force jumps at zero, twice per period. Exact by half periods.
+/// A mass between a soft and a hard spring: the slope of its force jumps at zero, twice per period. Exact by half
+/// periods.
 #[test]
 fn gradients_across_kinks_are_exact() {
     const STIFFNESS: [f64; 2] = [400.0, 2500.0];

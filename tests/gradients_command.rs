@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-/// At a loose tolerance differences of simulations are noise and the search with them ends higher; the internal derivative is that
-/// of the simulation itself. At a tight one both reach the same.
+/// At a loose tolerance differences of simulations are noise and the search with them ends higher; the internal
+/// derivative is that of the simulation itself. At a tight one both reach the same.
 #[test]
 fn internal_differentiation_needs_no_tight_tolerance() {
     let folder = tempfile::tempdir().expect("a folder");

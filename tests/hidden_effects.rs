@@ -151,8 +151,9 @@ fn cogging_is_found_with_its_period() {
     assert!((pitch.1 / TOOTH - 1.0).abs() < 0.01, "{} m", pitch.1);
 }
 
-/// A force that no law of the catalogue describes: the verdict says so, the extension transfers (eleven points do not make it
-/// exact, and the held-out record goes further out), and the shape shown is the magnet's, with a mean slope that the spring takes.
+/// A force that no law of the catalogue describes: the verdict says so, the extension transfers (eleven points do not
+/// make it exact, and the held-out record goes further out), and the shape shown is the magnet's, with a mean slope
+/// that the spring takes.
 #[test]
 fn a_force_without_a_law_is_shown_by_its_shape() {
     let (answer, outcome) = pulled(magnet, 39);

@@ -84,8 +84,8 @@ fn size(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |largest, value| largest.max(value.abs()))
 }
 
-/// Seven bodies, ten revolute joints, three loops: positions along the whole motion, the crank's velocity and acceleration,
-/// and the force in one of the closing joints.
+/// Seven bodies, ten revolute joints, three loops: positions along the whole motion, the crank's velocity and
+/// acceleration, and the force in one of the closing joints.
 #[test]
 fn andrews_mechanism_moves_as_published() {
     let Some(text) = shared("ivp/andrews_trajectory.csv") else { return };
@@ -400,8 +400,8 @@ solver {{ tolerance = 1e-11 }}
     }
 }
 
-/// A four-bar linkage of hinges in space, its crank turned as prescribed: the rocker's angle by trigonometry, the redundant
-/// constraints named once, and the coordinate of the joint that closes the loop.
+/// A four-bar linkage of hinges in space, its crank turned as prescribed: the rocker's angle by trigonometry, the
+/// redundant constraints named once, and the coordinate of the joint that closes the loop.
 #[test]
 fn four_bar_follows_its_crank() {
     let (crank, coupler, rocker, base): (f64, f64, f64, f64) = (0.1, 0.42, 0.3, 0.5);

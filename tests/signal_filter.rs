@@ -47,8 +47,8 @@ fn order_and_cutoff_agree_with_scipy() {
     }
 }
 
-/// The seed document's example (its section 4.1.2): 5/7 Hz, 2/20 dB gives order 8 when the figures are those of one pass;
-/// referred to the whole zero-phase operation (1/10 dB per pass) order 6 is enough.
+/// The seed document's example (its section 4.1.2): 5/7 Hz, 2/20 dB gives order 8 when the figures are those of one
+/// pass; referred to the whole zero-phase operation (1/10 dB per pass) order 6 is enough.
 #[test]
 fn the_document_s_example_is_of_order_eight_for_one_pass() {
     let one = low_pass(5.0, 7.0, 2.0, 20.0);
@@ -66,7 +66,8 @@ fn the_document_s_example_is_of_order_eight_for_one_pass() {
     assert!(20.0 * whole.amplitude(7.0).log10() < -20.0);
 }
 
-/// `scipy.signal.butter(8, 5.1675114220662905, fs=100, output='sos')`; SciPy carries the whole gain in its first section.
+/// `scipy.signal.butter(8, 5.1675114220662905, fs=100, output='sos')`; SciPy carries the whole gain in its first
+/// section.
 #[test]
 fn sections_agree_with_scipy() {
     let filter = Butterworth::with_cutoff(8, 5.1675114220662905, 100.0).unwrap();

@@ -78,7 +78,8 @@ fn cross_correlation_finds_the_lag() {
     assert_eq!(cross_correlation(&[1.0; 9], &source[..9], 2), [0.0; 3]);
 }
 
-/// x_t = 1.2 x_{t-1} - 0.5 x_{t-2} + e_t: coefficients within four standard errors (0.9 / sqrt N), order found, whitened.
+/// x_t = 1.2 x_{t-1} - 0.5 x_{t-2} + e_t: coefficients within four standard errors (0.9 / sqrt N), order found,
+/// whitened.
 #[test]
 fn autoregression_finds_and_whitens_coloured_noise() {
     let innovations = noise(4000, 11);
@@ -102,8 +103,8 @@ fn autoregression_finds_and_whitens_coloured_noise() {
     assert!((power / autocovariance(&samples, 0)[0] - 1.0).abs() < 0.05);
 }
 
-/// Whitening is linear, and the covariance of whitened noise is exactly diagonal: checked against a Cholesky factor of the
-/// process's covariance matrix for an AR(1).
+/// Whitening is linear, and the covariance of whitened noise is exactly diagonal: checked against a Cholesky factor of
+/// the process's covariance matrix for an AR(1).
 #[test]
 fn the_first_samples_are_whitened_exactly() {
     let model = AutoRegression::burg(

@@ -1,5 +1,5 @@
-//! Identifiability, covariance, noise, comparison: against closed solutions, tabulated SciPy 1.17.1 figures and repeated
-//! experiments with known truth.
+//! Identifiability, covariance, noise, comparison: against closed solutions, tabulated SciPy 1.17.1 figures and
+//! repeated experiments with known truth.
 
 use ident::fit::{Bounds, Control, EvaluationFailure, LeastSquares, Options, levenberg_marquardt};
 use ident::signal::{Butterworth, Prefilter};
@@ -177,8 +177,8 @@ fn scaled_noise(deviation: f64) -> impl Fn(u64) -> Vec<f64> {
     move |seed| noise(SAMPLES, 1000 + seed).into_iter().map(|value| deviation * value).collect()
 }
 
-/// 500 repetitions: the standard error of a coverage of 95 % is 1 %; the mean of the variances (150 samples, a third of them
-/// left by the filter) is good to about 1 %.
+/// 500 repetitions: the standard error of a coverage of 95 % is 1 %; the mean of the variances (150 samples, a third of
+/// them left by the filter) is good to about 1 %.
 fn assert_honest(result: &Repetitions, variance: f64) {
     println!(
         "coverage {:?}, variance {} (plain {})",
@@ -195,8 +195,8 @@ fn intervals_are_honest_for_white_noise() {
     assert_honest(&repeat(&Prefilter::identity(), &[1.0], &scaled_noise(0.3)), 0.09);
 }
 
-/// With the prefilter; the plain estimate (method 4.6) is too small by the share of the fitted parameters, the exact one
-/// (4.5) is not.
+/// With the prefilter; the plain estimate (method 4.6) is too small by the share of the fitted parameters, the exact
+/// one (4.5) is not.
 #[test]
 fn intervals_are_honest_behind_a_prefilter() {
     let filter = Prefilter::new(Some(Butterworth::with_cutoff(4, 8.0, 50.0).unwrap()), false);
@@ -284,8 +284,8 @@ fn noise_variances_of_several_channels() {
 
 // ---- combination ----
 
-/// Two halves of a record combined give the estimate and covariance of the whole (exact for a linear model); also when one half
-/// alone leaves a direction open.
+/// Two halves of a record combined give the estimate and covariance of the whole (exact for a linear model); also when
+/// one half alone leaves a direction open.
 #[test]
 fn halves_combine_to_the_whole() {
     let rows = 60;

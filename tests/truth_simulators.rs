@@ -294,8 +294,8 @@ fn shipped_records_are_up_to_date() {
     }
 }
 
-/// Likewise the modes of the elastic arm; they belong to a beam whose finite elements have the same frequencies: the lowest two, of
-/// which six elements know the second to 0.05 % and the third only to 0.2 %.
+/// Likewise the modes of the elastic arm; they belong to a beam whose finite elements have the same frequencies: the
+/// lowest two, of which six elements know the second to 0.05 % and the third only to 0.2 %.
 #[test]
 fn shipped_modes_are_up_to_date() {
     for (path, text) in truth::shipped::further() {

@@ -47,8 +47,8 @@ const EQUIPMENT: usize = 33;
 
 /// A rail vehicle of the reference application's size: 73 bodies, 17 closed loops, 158 force elements, 34 parameters.
 ///
-/// Carbody, two bogies with two wheelsets, axle boxes on radius rods, anti-roll bars, traction rods, motors on torque rods, and
-/// elastically mounted equipment; the wheelsets stand on shaken rails.
+/// Carbody, two bogies with two wheelsets, axle boxes on radius rods, anti-roll bars, traction rods, motors on torque
+/// rods, and elastically mounted equipment; the wheelsets stand on shaken rails.
 pub fn vehicle() -> String {
     let mut v = Vehicle {
         text: String::from("study vehicle \"Rail vehicle about its equilibrium\"\n"),
@@ -154,7 +154,8 @@ impl Vehicle {
         self.forces += 2;
     }
 
-    /// A rod between two points, hinged like a cardan shaft at one end and with a ball at the other, which closes a loop.
+    /// A rod between two points, hinged like a cardan shaft at one end and with a ball at the other, which closes a
+    /// loop.
     fn rod(&mut self, name: &str, from: &str, to: &str, reach: [f64; 3]) {
         let middle = reach.map(|x| x / 2.0);
         self.body(name, 15.0, [0.4, 0.4, 0.4], &[("end", reach)]);

@@ -1,4 +1,5 @@
-//! The reference problems P1 (quarter vehicle on a rig) and P2 (chain of forty bodies) as studies of bodies, joints and laws.
+//! The reference problems P1 (quarter vehicle on a rig) and P2 (chain of forty bodies) as studies of bodies, joints and
+//! laws.
 
 use std::f64::consts::PI;
 use std::fmt::Write;

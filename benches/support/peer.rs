@@ -27,8 +27,8 @@ pub struct Peer {
 }
 
 impl Peer {
-    /// In the folder that the environment variable `IDENT_PEERS` names: a copy of the peers' scripts, prepared as they say, with
-    /// their Python environment in `venv`.
+    /// In the folder that the environment variable `IDENT_PEERS` names: a copy of the peers' scripts, prepared as they
+    /// say, with their Python environment in `venv`.
     pub fn start() -> Option<Self> {
         let folder = std::env::var_os("IDENT_PEERS").map(std::path::PathBuf::from)?;
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peer.py");

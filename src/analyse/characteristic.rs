@@ -24,7 +24,8 @@ pub enum Course {
 }
 
 impl Demonstration {
-    /// The line ``Example: `FIELDS` over AMPLITUDE at FREQUENCY`` or ``Example: `FIELDS` over DURATION`` of a law's remark.
+    /// The line ``Example: `FIELDS` over AMPLITUDE at FREQUENCY`` or ``Example: `FIELDS` over DURATION`` of a law's
+    /// remark.
     pub fn of_remark(documentation: &str) -> Option<Self> {
         let text = documentation.replace('\n', " ");
         let (_, example) = text.split_once("Example: `")?;

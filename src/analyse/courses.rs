@@ -15,7 +15,8 @@ pub struct Courses {
     pub parameters: Vec<String>,
     /// Parameters held at their estimates.
     pub held: Vec<String>,
-    /// Allowed work in simulations of all records; a gradient by internal differentiation counts as one per parameter more.
+    /// Allowed work in simulations of all records; a gradient by internal differentiation counts as one per parameter
+    /// more.
     pub budget: usize,
     pub courses: Vec<Course>,
 }
@@ -37,7 +38,8 @@ pub struct Course {
 /// A cost within this share of the best counts as reached.
 const REACHED: f64 = 0.01;
 
-/// Runs every optimiser from the study's start, with the weights of a first fit's end so that all minimise the same cost.
+/// Runs every optimiser from the study's start, with the weights of a first fit's end so that all minimise the same
+/// cost.
 /// `chosen`: names of the parameters to search (empty: all); the others keep the values of that fit.
 ///
 /// # Errors

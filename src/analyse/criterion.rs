@@ -21,8 +21,8 @@ pub(super) fn manoeuvres(study: &Study) -> Vec<Record> {
 }
 
 /// Simulates the manoeuvres with parameters `theta` (SI) and takes the criteria from them. The gradient is that of the
-/// discrete solution (internal differentiation), also where a criterion is an extreme value: the instant of the extreme is
-/// stationary.
+/// discrete solution (internal differentiation), also where a criterion is an extreme value: the instant of the extreme
+/// is stationary.
 ///
 /// # Errors
 /// The first manoeuvre (in order) that cannot be simulated.

@@ -41,7 +41,8 @@ pub struct CutCurve {
     pub band: String,
     /// Discrepancy in %, `null` where the simulation fails.
     pub discrepancy: Vec<f64>,
-    /// Scatter about a smooth curve, from fifth differences, relative to the range of the curve: what the integrator's error leaves.
+    /// Scatter about a smooth curve, from fifth differences, relative to the range of the curve: what the integrator's
+    /// error leaves.
     pub roughness: f64,
 }
 
@@ -123,7 +124,8 @@ fn bands(study: &Study, records: &[&Record]) -> Vec<(Option<Filter>, String)> {
     }
 }
 
-/// Fifth differences are what scatter leaves of a smooth curve; their standard deviation is sqrt(252) times that of the scatter.
+/// Fifth differences are what scatter leaves of a smooth curve; their standard deviation is sqrt(252) times that of the
+/// scatter.
 fn roughness(values: &[f64]) -> f64 {
     let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     let range = finite.iter().fold(0.0_f64, |a, &b| a.max(b)) - finite.iter().fold(f64::INFINITY, |a, &b| a.min(b));

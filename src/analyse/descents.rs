@@ -1,5 +1,5 @@
-//! The cost over the iterations of a search, its gradient by internal differentiation or by finite differences (the document's
-//! Fig. 3.10).
+//! The cost over the iterations of a search, its gradient by internal differentiation or by finite differences (the
+//! document's Fig. 3.10).
 
 use crate::diagnostics::Diagnostic;
 use crate::fit::{Bounds, Control, EvaluationFailure, LeastSquares, Options, levenberg_marquardt};
@@ -11,7 +11,8 @@ use serde::Serialize;
 /// Iterations after which a search that still creeps is ended.
 const ITERATIONS: usize = 20;
 
-/// Searches with both gradients at several tolerances of the integrator, from the study's start, all under the same weights.
+/// Searches with both gradients at several tolerances of the integrator, from the study's start, all under the same
+/// weights.
 #[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct Descents {
     pub study: String,
@@ -106,7 +107,8 @@ impl LeastSquares for Watched<'_> {
         self.problem.residual(theta)
     }
 
-    /// Forward differences over the root of the accuracy, where truncation and noise are of one size (Gill-Murray-Wright-1981, 8.6).
+    /// Forward differences over the root of the accuracy, where truncation and noise are of one size
+    /// (Gill-Murray-Wright-1981, 8.6).
     fn residual_and_gradient(&mut self, theta: &[f64]) -> Result<(Vec<f64>, Vec<f64>), EvaluationFailure> {
         let Some(accuracy) = self.differences else { return self.problem.residual_and_gradient(theta) };
         let residual = self.problem.residual(theta)?;

@@ -4,7 +4,8 @@ use super::criterion::evaluate_on;
 use crate::simulation::{Compiled, Gradient, Record};
 use rayon::prelude::*;
 
-/// (J(theta + s) - J(theta - s)) / 2 s per criterion and parameter, s the parameter's standard deviation, cut at its bounds.
+/// (J(theta + s) - J(theta - s)) / 2 s per criterion and parameter, s the parameter's standard deviation, cut at its
+/// bounds.
 /// `None` where a simulation fails or the parameter has no spread.
 pub(super) fn relevances(
     compiled: &Compiled,

@@ -1,8 +1,8 @@
 //! What an identified model is good for.
 //!
-//! *In*: a compiled study with manoeuvres and criteria, an estimate with its covariance. *Out*: per criterion its value,
-//! interval and verdict ([`Validity`]); before any test, what
-//! the offered excitations and sensors would tell ([`Plan`]); what a single law does ([`Characteristic`]). *Must not happen here*: fits, files, text for a terminal.
+//! *In*: a compiled study with manoeuvres and criteria, an estimate with its covariance. *Out*: per criterion its
+//! value, interval and verdict ([`Validity`]); before any test, what the offered excitations and sensors would tell
+//! ([`Plan`]); what a single law does ([`Characteristic`]). *Must not happen here*: fits, files, text for a terminal.
 
 mod characteristic;
 mod courses;

@@ -10,8 +10,8 @@ use crate::study::{Criterion, Parameter};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// A criterion depends on an undetermined direction when its gradient (per scaled parameter) has more than this share along it.
-/// The gradient's error is some hundred times smaller.
+/// A criterion depends on an undetermined direction when its gradient (per scaled parameter) has more than this share
+/// along it. The gradient's error is some hundred times smaller.
 const ORTHOGONALITY: f64 = 1e-3;
 /// Failed draws beyond this share make the sampled interval meaningless.
 const FAILED_SHARE: f64 = 0.05;

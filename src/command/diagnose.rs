@@ -60,7 +60,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
     if arguments.write { write_extension(&study.study, &answer) } else { Ok(()) }
 }
 
-/// Appends the accepted variants to the study file; the patch goes to standard error so that `--format json` stays clean.
+/// Appends the accepted variants to the study file; the patch goes to standard error so that `--format json` stays
+/// clean.
 fn write_extension(path: &Path, answer: &Answer) -> Result<(), Failed> {
     let Some(extension) = &answer.extension else {
         eprintln!("nothing to write: no extension was accepted");

@@ -59,7 +59,8 @@ pub(super) struct SearchArguments {
     /// Where the search starts
     #[arg(long, value_enum, default_value_t)]
     start: StartArgument,
-    /// Noise of the measurements: weight by an autoregressive model of its colour, or not (default: as the study's `solver` says)
+    /// Noise of the measurements: weight by an autoregressive model of its colour, or not (default: as the study's
+    /// `solver` says)
     #[arg(long, value_enum)]
     noise: Option<NoiseArgument>,
     /// Widen the band of the filter to that of the study in so many steps, each twice as wide

@@ -1,7 +1,8 @@
 //! The command line: arguments in, exit status out. One file per subcommand.
 //!
-//! *In*: the process's arguments. *Out*: text on standard output, diagnostics and progress on standard error, files that
-//! were asked for, and an exit status that is 0 only when the question was answered. *Must not happen here*: computation.
+//! *In*: the process's arguments. *Out*: text on standard output, diagnostics and progress on standard error, files
+//! that were asked for, and an exit status that is 0 only when the question was answered. *Must not happen here*:
+//! computation.
 
 mod check;
 mod compare;

@@ -5,8 +5,8 @@ use crate::report::page::RenderError;
 use std::io::Write;
 use std::path::Path;
 
-/// Writes `content` to a temporary file beside `path` and renames it. Folders that do not exist are made: an answer of minutes is not
-/// thrown away for the want of one.
+/// Writes `content` to a temporary file beside `path` and renames it. Folders that do not exist are made: an answer of
+/// minutes is not thrown away for the want of one.
 pub(super) fn write_whole(path: &Path, content: &str) -> Result<(), Failed> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let temporary = || tempfile::Builder::new().prefix(".ident").tempfile_in(folder);

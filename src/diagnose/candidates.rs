@@ -51,8 +51,8 @@ pub(super) struct Unknown {
     pub lower: f64,
     pub upper: f64,
     pub neutral: f64,
-    /// Standard deviation of a prior about the neutral value. Points of a free curve have one: what the curve shares with other
-    /// parameters (its mean slope with a stiffness) stays with those.
+    /// Standard deviation of a prior about the neutral value. Points of a free curve have one: what the curve shares
+    /// with other parameters (its mean slope with a stiffness) stays with those.
     pub prior: Option<f64>,
     pub role: UnknownRole,
 }
@@ -139,12 +139,14 @@ pub(super) fn candidates(study: &Study, typical: &[Typical]) -> Vec<Candidate> {
     list
 }
 
-/// A body that turns about an axis through its centre of gravity, as far as the study says: unbalance, eccentric wheels.
+/// A body that turns about an axis through its centre of gravity, as far as the study says: unbalance, eccentric
+/// wheels.
 fn eccentric_body(study: &Study, index: usize, body: &Body) -> Option<Candidate> {
     let turns = study.joints.iter().filter(|joint| joint.child.body == Some(index) && joint.orientation.is_none());
     let turns: Vec<[f64; 3]> = turns
         .flat_map(|joint| &joint.axes)
-        .filter_map(|axis| matches!(axis.motion, AxisMotion::Turn(_)).then(|| axis.motion.direction()))
+        .filter(|axis| matches!(axis.motion, AxisMotion::Turn(_)))
+        .map(|axis| axis.motion.direction())
         .collect();
     let mass = start_value(study, body.mass).filter(|mass| *mass > 0.0)?;
     let moments = [0, 1, 2].map(|axis| start_value(study, body.inertia[axis]).unwrap_or(0.0));
@@ -226,8 +228,8 @@ fn stands_at_joint(study: &Study, effect: &EffectDeclaration, place: &Place) -> 
     on_joint && effect.kinds.contains(&PlaceKind::Joint)
 }
 
-/// What an effect adds to one of several elements between the same points is the same force at each: the first of them, where it
-/// is not this one.
+/// What an effect adds to one of several elements between the same points is the same force at each: the first of them,
+/// where it is not this one.
 fn stands_beside<'a>(study: &'a Study, effect: &EffectDeclaration, place: &Place) -> Option<&'a Place> {
     if place.kind != PlaceKind::Force || !effect.replaces.is_empty() {
         return None;
@@ -281,8 +283,8 @@ fn unused_name(study: &Study, wanted: &str) -> String {
     (2..).map(|count| format!("{wanted}_{count}")).find(|name| !used(name)).unwrap_or_else(|| wanted.to_owned())
 }
 
-/// Natural scale of a parameter at a place: its monomial evaluated with typical magnitudes. `None` where the place never
-/// moves or carries nothing, so the effect could not show.
+/// Natural scale of a parameter at a place: its monomial evaluated with typical magnitudes. `None` where the place
+/// never moves or carries nothing, so the effect could not show.
 fn natural_scale(parameter: &EffectParameter, typical: &Typical) -> Option<f64> {
     let mut scale = 1.0;
     for &(quantity, exponent) in &parameter.monomial {
@@ -388,7 +390,8 @@ fn freed_constant(study: &Study, constant: &crate::study::Constant) -> Option<Ca
     })
 }
 
-/// The next of 1, 2, 5 times a power of ten: bounds that a reader can take in, and that do not change with every record.
+/// The next of 1, 2, 5 times a power of ten: bounds that a reader can take in, and that do not change with every
+/// record.
 fn rounded_up(value: f64) -> f64 {
     let power = 10f64.powf(value.log10().floor());
     [1.0, 2.0, 5.0].into_iter().map(|digit| digit * power).find(|rounded| *rounded >= value).unwrap_or(10.0 * power)

@@ -90,7 +90,8 @@ impl Course {
         self.texts = texts.to_vec();
     }
 
-    /// Takes back all that was accepted: beside what it leaves unexplained, its share of the held-out error, `gain`, is small.
+    /// Takes back all that was accepted: beside what it leaves unexplained, its share of the held-out error, `gain`, is
+    /// small.
     pub(super) fn dismiss(&mut self, gain: f64) {
         let mut names = Vec::new();
         for step in &mut self.steps {

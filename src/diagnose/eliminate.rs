@@ -1,5 +1,5 @@
-//! Causes accepted early are tried again beside those accepted later: the first of two causes is judged while the second is still
-//! missing, and may have stood in for it (backward elimination, Miller-2002, chapter 3).
+//! Causes accepted early are tried again beside those accepted later: the first of two causes is judged while the
+//! second is still missing, and may have stood in for it (backward elimination, Miller-2002, chapter 3).
 
 use super::course::Course;
 use super::judge::{self, HeldOut};
@@ -12,8 +12,8 @@ use crate::identify::{Fitted, Settings, fit};
 use crate::simulation::Compiled;
 use crate::study;
 
-/// The model without the causes that would not be accepted any more; the last one accepted is not questioned. `first` is the model
-/// without any.
+/// The model without the causes that would not be accepted any more; the last one accepted is not questioned. `first`
+/// is the model without any.
 pub(super) fn eliminate(
     first: &Model,
     mut model: Model,

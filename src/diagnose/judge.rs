@@ -143,8 +143,8 @@ pub(super) fn judge(
             judge_one(round, candidate, refitted, held_out, &effective, base_bic, candidates.len())
         })
         .collect();
-    // Equivalent candidates (one effect at two elements between the same bodies) differ by rounding only: the order of the
-    // catalogue decides then.
+    // Equivalent candidates (one effect at two elements between the same bodies) differ by rounding only: the order of
+    // the catalogue decides then.
     let key = |entry: &Judged| ((entry.bic / EQUIVALENT_BIC).round(), entry.refitted.candidate);
     judged.sort_by(|a, b| key(a).0.total_cmp(&key(b).0).then(key(a).1.cmp(&key(b).1)));
     judged
@@ -263,8 +263,8 @@ pub(super) fn transfers(change: &ErrorChange) -> bool {
     100.0 * change.estimate <= -MINIMUM_HELD_OUT_GAIN && change.is_improvement()
 }
 
-/// Candidates that cannot be told from `judged[chosen]`: their criterion is as good within what the data can tell, and none
-/// was refused for its plausibility. The chosen one comes first.
+/// Candidates that cannot be told from `judged[chosen]`: their criterion is as good within what the data can tell, and
+/// none was refused for its plausibility. The chosen one comes first.
 pub(super) fn indistinguishable(judged: &[Judged], chosen: usize, candidates: &[Candidate]) -> Vec<String> {
     let name = |position: usize| candidates[judged[position].refitted.candidate].name.clone();
     let mut group = vec![name(chosen)];

@@ -1,8 +1,8 @@
 //! The picture an engineer wants: the force the model lacks at a place, as a history and over the place's motion.
 //!
-//! A free force of time (piecewise linear between knots) is put on the place; its knot values follow from the residual by
-//! regularised least squares on the sensitivities. The model's other parameters stand at the extended model's values, so
-//! that what the base fit had absorbed shows up as well.
+//! A free force of time (piecewise linear between knots) is put on the place; its knot values follow from the residual
+//! by regularised least squares on the sensitivities. The model's other parameters stand at the extended model's
+//! values, so that what the base fit had absorbed shows up as well.
 
 use super::MissingForce;
 use crate::expression::{Graph, Node, Symbol};
@@ -193,8 +193,8 @@ fn nearest(record: &Record, time: f64) -> usize {
     times.partition_point(|&t| t < time).min(times.len() - 1)
 }
 
-/// The accepted effects' own force at `place` along the extended model's motion: its loads minus the same loads with all
-/// strengths at their neutral values.
+/// The accepted effects' own force at `place` along the extended model's motion: its loads minus the same loads with
+/// all strengths at their neutral values.
 fn explained(source: &Source, record: &Record, place: &Place) -> Option<Vec<f64>> {
     let mut study = source.compiled.study.clone();
     let wanted = force_place(&study, place)?;

@@ -176,7 +176,8 @@ fn first_model(
     })
 }
 
-/// Share of the error that `extended` takes away from `model`: of the records that were not fitted, else of those that were.
+/// Share of the error that `extended` takes away from `model`: of the records that were not fitted, else of those that
+/// were.
 fn gain(model: &Model, extended: &Model, roles: &Roles) -> f64 {
     let change = change(model, extended, roles).map(|change| change.estimate);
     -change.unwrap_or_else(|| extended.fitted.discrepancy() / model.fitted.discrepancy() - 1.0)

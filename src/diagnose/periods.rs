@@ -1,8 +1,8 @@
-//! The periods of something that repeats along a motion (cogging, an eccentric wheel): a coarse grid would miss them between two
-//! values.
+//! The periods of something that repeats along a motion (cogging, an eccentric wheel): a coarse grid would miss them
+//! between two values.
 //!
-//! The wavenumber is scanned as a periodogram's frequency is: many copies of the candidate act in one simulation, each with a
-//! period and strengths of its own, and what a copy explains to first order is its power.
+//! The wavenumber is scanned as a periodogram's frequency is: many copies of the candidate act in one simulation, each
+//! with a period and strengths of its own, and what a copy explains to first order is its power.
 
 use super::candidates::{Candidate, Unknown, UnknownRole};
 use super::round::Round;
@@ -11,8 +11,8 @@ use crate::fit::LeastSquares;
 use crate::linear::least_squares;
 use crate::quantities::Unit;
 
-/// Step of the wavenumber in units of the inverse typical magnitude: a motion of that root mean square tells apart what lies further
-/// from each other (between two values a wave keeps three quarters of its correlation).
+/// Step of the wavenumber in units of the inverse typical magnitude: a motion of that root mean square tells apart what
+/// lies further from each other (between two values a wave keeps three quarters of its correlation).
 const STEP: f64 = 0.25;
 /// Waves in one simulation.
 const BATCH: usize = 25;

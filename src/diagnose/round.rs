@@ -50,8 +50,8 @@ impl<'a> Round<'a> {
         Self { loaded, variant, compiled, records, fitted, basis, projected_residual, effective }
     }
 
-    /// The candidate's variant compiled. `frozen`: the current parameters become constants at their optimum, so that only
-    /// the candidate's own unknowns remain. `None` where the variant is refused or impossible.
+    /// The candidate's variant compiled. `frozen`: the current parameters become constants at their optimum, so that
+    /// only the candidate's own unknowns remain. `None` where the variant is refused or impossible.
     pub(super) fn compile(&self, candidate: &Candidate, values: &[f64], frozen: bool) -> Option<Compiled> {
         let text = candidate.variant(TRIAL, self.variant, values);
         let extended = self.loaded.with_text(&text);
@@ -157,8 +157,9 @@ fn peaks(residual: &[f64], rate: f64) -> Vec<(f64, f64)> {
     peaks
 }
 
-/// Frequency of a harmonic whose highest line is `k`: its distance from there follows from the height of the higher neighbour (of a
-/// rectangular window the heights fall with the inverse distance). A refit that starts a whole line off ends elsewhere.
+/// Frequency of a harmonic whose highest line is `k`: its distance from there follows from the height of the higher
+/// neighbour (of a rectangular window the heights fall with the inverse distance). A refit that starts a whole line off
+/// ends elsewhere.
 fn between_lines(spectrum: &PowerSpectrum, k: usize) -> f64 {
     let [before, here, after] = [k - 1, k, k + 1].map(|line| spectrum.density[line].sqrt());
     let neighbour = before.max(after);

@@ -1,9 +1,9 @@
-//! The screen: every candidate tried at finite strengths with the full nonlinear simulation, the fitted parameters moving
-//! along to first order.
+//! The screen: every candidate tried at finite strengths with the full nonlinear simulation, the fitted parameters
+//! moving along to first order.
 //!
-//! For each grid point the residual is simulated and what the fitted parameters can absorb (the span of the base gradient)
-//! is projected out; the candidate's rank is the concentrated deviance of what remains. Strengths come from the score at
-//! zero strength (Breusch-Pagan-1980, Rao-1948) where it exists, else from a grid.
+//! For each grid point the residual is simulated and what the fitted parameters can absorb (the span of the base
+//! gradient) is projected out; the candidate's rank is the concentrated deviance of what remains. Strengths come from
+//! the score at zero strength (Breusch-Pagan-1980, Rao-1948) where it exists, else from a grid.
 
 use super::candidates::{Candidate, Unknown, UnknownRole};
 use super::periods::periods;
@@ -66,8 +66,9 @@ const EQUAL: f64 = 1e-6;
 /// Chi-square statistic above which two causes that score alike do so not by both doing nothing.
 const SHOWS: f64 = 1.0;
 
-/// One effect at elements that move alike (between the same bodies, or along the axis of their joint) is the very same force, and so
-/// are a constant load on a single slider and its tilted support: the first one stands for all, the others become its aliases.
+/// One effect at elements that move alike (between the same bodies, or along the axis of their joint) is the very same
+/// force, and so are a constant load on a single slider and its tilted support: the first one stands for all, the
+/// others become its aliases.
 pub(super) fn merge_equal(candidates: &mut [Candidate], screened: &mut [Option<Screened>], current_deviance: f64) {
     for first in 0..candidates.len() {
         for other in first + 1..candidates.len() {
@@ -115,7 +116,8 @@ impl Screened {
     }
 }
 
-/// All combinations of shape values, as full vectors of unknowns with strengths at neutral, and the simulations spent on finding them.
+/// All combinations of shape values, as full vectors of unknowns with strengths at neutral, and the simulations spent
+/// on finding them.
 fn shape_grid(round: &Round, candidate: &Candidate) -> (Vec<Vec<f64>>, usize) {
     let mut simulations = 0;
     let mut grid = vec![candidate.neutral()];
@@ -158,8 +160,8 @@ impl Trial<'_> {
         Some(self.round.deviance(&residual))
     }
 
-    /// Points to try: all finite strengths at all shapes, or multiples of the strength estimated at zero at the shapes whose
-    /// score is best. Notes the score on the way.
+    /// Points to try: all finite strengths at all shapes, or multiples of the strength estimated at zero at the shapes
+    /// whose score is best. Notes the score on the way.
     fn points(&mut self, best: &mut Screened) -> Vec<Vec<f64>> {
         let (grid, simulations) = shape_grid(self.round, self.candidate);
         self.problem.simulations += simulations;
@@ -190,8 +192,8 @@ impl Trial<'_> {
             .collect()
     }
 
-    /// Score statistic and linear estimate of the strengths at their neutral values; `None` where all have the wrong sign or
-    /// no influence.
+    /// Score statistic and linear estimate of the strengths at their neutral values; `None` where all have the wrong
+    /// sign or no influence.
     fn score(&mut self, shapes: &[f64], best: &mut Screened) -> Option<(f64, Strengths)> {
         let amplitudes: Vec<usize> = (0..self.candidate.unknowns.len())
             .filter(|&i| self.candidate.unknowns[i].role == UnknownRole::Amplitude)

@@ -1,5 +1,5 @@
-//! What the last model leaves, held against the sensors themselves: an offset or a gain of one record alone (no other record could
-//! confirm it, so no extension is made of it), and channels that show a share of another one.
+//! What the last model leaves, held against the sensors themselves: an offset or a gain of one record alone (no other
+//! record could confirm it, so no extension is made of it), and channels that show a share of another one.
 
 use crate::identify::{Block, Fitted};
 use crate::quantities::format_number;

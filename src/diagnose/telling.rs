@@ -11,7 +11,8 @@ use rayon::prelude::*;
 /// Chi-square distance from which on a test decides between two causes: one in a thousand by chance.
 const DECISIVE: f64 = 11.0;
 
-/// Offered tests (the study's manoeuvres) against the accepted cause and its strongest rival, in words; `group` holds positions in
+/// Offered tests (the study's manoeuvres) against the accepted cause and its strongest rival, in words; `group` holds
+/// positions in
 /// `judged`, the accepted one first.
 pub(super) fn telling(round: &Round, candidates: &[Candidate], judged: &[Judged], group: &[usize]) -> Option<String> {
     let (&accepted, &rival) = (group.first()?, group.get(1)?);
@@ -49,7 +50,8 @@ fn advice([first, second]: [&str; 2], distances: &[(f64, String)]) -> Option<Str
     })
 }
 
-/// Squared difference between the two models' channels in units of the noise, without what the rival's parameters could absorb.
+/// Squared difference between the two models' channels in units of the noise, without what the rival's parameters could
+/// absorb.
 fn distance(round: &Round, accepted: &Judged, rival: &Judged, manoeuvre: usize) -> Option<f64> {
     let run = |judged: &Judged, gradient: Gradient| -> Option<(Trajectory, Vec<usize>)> {
         let compiled: &Compiled = &judged.refitted.compiled;

@@ -1,8 +1,8 @@
 //! Where the named causes leave something: does a force of free shape over the motion of one place explain more?
 //!
-//! Effects whose amplitudes are `unnamed` are points of such a shape. They are tried last, since a flexible curve fits a bit
-//! better than almost any law: alone against the chain of named causes (does one curve explain more than all of them
-//! together?), then behind it.
+//! Effects whose amplitudes are `unnamed` are points of such a shape. They are tried last, since a flexible curve fits
+//! a bit better than almost any law: alone against the chain of named causes (does one curve explain more than all of
+//! them together?), then behind it.
 
 use super::candidates::{self, Candidate};
 use super::course::Course;
@@ -20,7 +20,8 @@ use rayon::prelude::*;
 
 /// A residual with fewer independent samples than this share is not noise alone.
 const NOISE_SHARE: f64 = 0.9;
-/// Where a channel's residual predicts more than this share of its own power something is wrong, whatever the candidates say.
+/// Where a channel's residual predicts more than this share of its own power something is wrong, whatever the
+/// candidates say.
 const UNEXPLAINED: f64 = 0.3;
 /// Share of the held-out error of the named causes by which a curve must do better than they.
 const LEAST_GAIN: f64 = 0.5;
@@ -30,13 +31,14 @@ const LEAST_SHARE: f64 = 0.25;
 const SAME_GAIN: f64 = 0.99;
 /// A search that was asked to end before so many causes may not have come to what it would name.
 const CHAIN: usize = 3;
-/// Curves refitted after the screen, and in how many iterations: beside a misfit that other parameters have bent to, the screen's linear
-/// estimate says little about a curve. The best of these are fitted to the end.
+/// Curves refitted after the screen, and in how many iterations: beside a misfit that other parameters have bent to,
+/// the screen's linear estimate says little about a curve. The best of these are fitted to the end.
 const REFITTED: usize = 12;
 const ITERATIONS: usize = 6;
 const FULL_REFITS: usize = 2;
 
-/// The model extended by a curve, in place of the chain of named causes or behind it; `None` where none is needed or none helps.
+/// The model extended by a curve, in place of the chain of named causes or behind it; `None` where none is needed or
+/// none helps.
 pub(super) fn unnamed(
     first: &Model,
     last: &Model,
@@ -118,7 +120,8 @@ fn trial(
     Ok(Some(next))
 }
 
-/// Whether the screen saw the curve of a candidate explain as much at `place`: places that move alike differ by rounding only.
+/// Whether the screen saw the curve of a candidate explain as much at `place`: places that move alike differ by
+/// rounding only.
 fn serves_at(
     place: &str,
     index: usize,
@@ -176,9 +179,9 @@ fn refitted(
         .collect()
 }
 
-/// Whether the curve explains more than `rival` of the records that were not fitted: a chain of wrong causes follows the fitted ones
-/// ever better and the others ever worse. Names tell more than a curve that does a little better. Where the rival is a patchwork of
-/// causes at the curve's own place, as much is enough.
+/// Whether the curve explains more than `rival` of the records that were not fitted: a chain of wrong causes follows
+/// the fitted ones ever better and the others ever worse. Names tell more than a curve that does a little better. Where
+/// the rival is a patchwork of causes at the curve's own place, as much is enough.
 fn beats(curve: &Judged, rival: &Model, validation: &[&Record], is_patchwork: bool) -> bool {
     let own = &curve.refitted.fitted;
     let weights = &own.weighting.weights;

@@ -23,7 +23,8 @@ pub fn similar_word<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
 /// Letters at least that words of one stem share.
 const STEM: usize = 5;
 
-/// Edits that still count as a slip: one in three letters of the shorter word. A wholly different letter case is no edit.
+/// Edits that still count as a slip: one in three letters of the shorter word. A wholly different letter case is no
+/// edit.
 fn tolerance(name: &str, candidate: &str) -> usize {
     name.chars().count().min(candidate.chars().count()).div_ceil(3).min(3)
 }

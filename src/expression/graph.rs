@@ -65,8 +65,8 @@ pub enum Operation {
         otherwise: Node,
     },
     /// The `order`-th time derivative of sampled input channel `input`, at an arbitrary time argument, so that
-    /// a delayed input is `Sample { time: t - delay }` and differentiable with respect to the delay. From [`CURVES`] on the
-    /// channels are the curves of the graph, functions of any argument.
+    /// a delayed input is `Sample { time: t - delay }` and differentiable with respect to the delay. From [`CURVES`] on
+    /// the channels are the curves of the graph, functions of any argument.
     Sample {
         input: u32,
         order: u8,

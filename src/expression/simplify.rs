@@ -1,7 +1,7 @@
 //! The rule table that is applied whenever a node is built.
 //!
-//! Rules keep the value up to rounding wherever all operands are finite. `0 x = 0`, `x - x = 0` and `x / x = 1` also hold where
-//! the unsimplified form would be undefined: a structural zero must vanish whatever it multiplies.
+//! Rules keep the value up to rounding wherever all operands are finite. `0 x = 0`, `x - x = 0` and `x / x = 1` also
+//! hold where the unsimplified form would be undefined: a structural zero must vanish whatever it multiplies.
 
 use super::graph::{Binary, Graph, Node, Operation, Unary};
 

@@ -37,8 +37,8 @@ impl Optimiser {
 pub struct Search {
     pub theta: Vec<f64>,
     pub cost: f64,
-    /// Improvements of the best cost over the work done until then: (evaluations, cost), both strictly monotonic. A gradient counts
-    /// as many evaluations as it has columns.
+    /// Improvements of the best cost over the work done until then: (evaluations, cost), both strictly monotonic. A
+    /// gradient counts as many evaluations as it has columns.
     pub history: Vec<(usize, f64)>,
     /// Evaluations in all.
     pub work: usize,
@@ -145,7 +145,8 @@ impl<'a, P: LeastSquares + ?Sized> Counted<'a, P> {
     }
 }
 
-/// Searches with one of the alternatives; `Optimiser::LevenbergMarquardt` is not among them and does nothing but evaluate the start.
+/// Searches with one of the alternatives; `Optimiser::LevenbergMarquardt` is not among them and does nothing but
+/// evaluate the start.
 /// `budget`: evaluations.
 pub fn search<P: LeastSquares + ?Sized>(
     optimiser: Optimiser,

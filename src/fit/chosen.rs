@@ -20,8 +20,8 @@ impl Default for Chosen {
     }
 }
 
-/// Minimises with the chosen optimiser. Constraints hold with Levenberg-Marquardt; the alternatives know bounds only, and points
-/// that violate a constraint fail for them.
+/// Minimises with the chosen optimiser. Constraints hold with Levenberg-Marquardt; the alternatives know bounds only,
+/// and points that violate a constraint fail for them.
 ///
 /// # Errors
 /// As [`super::levenberg_marquardt`]; for an alternative also where the best point it found has no gradient.

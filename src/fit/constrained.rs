@@ -26,8 +26,8 @@ const FIRST_PENALTY: f64 = 10.0;
 /// The penalty grows by this factor where the violation does not fall to a quarter.
 const GROWTH: f64 = 10.0;
 
-/// As [`levenberg_marquardt`], subject to constraints. Where the minimum without them satisfies them, that is the answer. The
-/// rows of the result are those of the problem.
+/// As [`levenberg_marquardt`], subject to constraints. Where the minimum without them satisfies them, that is the
+/// answer. The rows of the result are those of the problem.
 ///
 /// # Errors
 /// As [`levenberg_marquardt`].

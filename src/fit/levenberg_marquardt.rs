@@ -16,10 +16,11 @@ const SCALE_FLOOR: f64 = 1e-3;
 /// Minimises `|r(theta)|^2` over `bounds` from `start`.
 ///
 /// Gauss-Newton model in a trust region scaled by the gradient's columns (Levenberg-1944, Marquardt-1963,
-/// More-1978); parameters with two finite bounds are mapped to `[0,1]`, by their logarithm where both are positive. Bounds hold exactly at every evaluation: the
-/// bounded model is minimised by an active set, parameters at a bound that the cost pushes against are left out.
-/// Directions without influence are not followed. An evaluation that fails, or gives a non-finite number, shortens the
-/// step. `observer` is called after every accepted step and may stop the iteration.
+/// More-1978); parameters with two finite bounds are mapped to `[0,1]`, by their logarithm where both are positive.
+/// Bounds hold exactly at every evaluation: the bounded model is minimised by an active set, parameters at a bound that
+/// the cost pushes against are left out. Directions without influence are not followed. An evaluation that fails, or
+/// gives a non-finite number, shortens the step. `observer` is called after every accepted step and may stop the
+/// iteration.
 ///
 /// # Errors
 /// [`FitError`] when the start is outside its bounds or cannot be evaluated.

@@ -40,8 +40,8 @@ pub fn original(loss: Loss, s: f64) -> f64 {
     }
 }
 
-/// Standard deviation of residuals of which some are outliers, from the median of their absolute values (of the residuals
-/// before the transformation).
+/// Standard deviation of residuals of which some are outliers, from the median of their absolute values (of the
+/// residuals before the transformation).
 pub fn robust_deviation(residuals: impl Iterator<Item = f64>) -> f64 {
     let sizes: Vec<f64> = residuals.map(f64::abs).collect();
     if sizes.is_empty() { 0.0 } else { MEDIAN_FACTOR * Data::new(sizes).median() }

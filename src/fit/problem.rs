@@ -76,8 +76,8 @@ impl Bounds {
         if width.is_finite() && width > 0.0 { self.lower[index] } else { 0.0 }
     }
 
-    /// Whether the parameter is searched by its logarithm: one between positive bounds scales the model, and residuals depend on
-    /// its factor more evenly than on its difference.
+    /// Whether the parameter is searched by its logarithm: one between positive bounds scales the model, and residuals
+    /// depend on its factor more evenly than on its difference.
     fn is_logarithmic(&self, index: usize) -> bool {
         self.lower[index] > 0.0 && self.upper[index].is_finite() && self.upper[index] > self.lower[index]
     }
@@ -87,8 +87,8 @@ impl Bounds {
         (self.upper[index] / self.lower[index]).ln()
     }
 
-    /// d(theta)/d(coordinate) at `value`, in the coordinate in which the search moves: `[0,1]` between two finite bounds, else the
-    /// parameter itself.
+    /// d(theta)/d(coordinate) at `value`, in the coordinate in which the search moves: `[0,1]` between two finite
+    /// bounds, else the parameter itself.
     pub(super) fn slope(&self, index: usize, value: f64) -> f64 {
         if self.is_logarithmic(index) { value * self.logarithmic_width(index) } else { self.scale(index) }
     }

@@ -32,8 +32,8 @@ pub struct Settings {
     pub start: Option<Vec<f64>>,
     /// Weights per measure (1/SI); found by the fit where absent.
     pub weights: Option<Weighting>,
-    /// Weights to begin with where none are given, in place of the channels' magnitudes: a start that is good under these may be
-    /// left for another minimum under those.
+    /// Weights to begin with where none are given, in place of the channels' magnitudes: a start that is good under
+    /// these may be left for another minimum under those.
     pub first_weights: Option<Weighting>,
     pub maximum_iterations: Option<usize>,
     /// Further searches from points all over the bounds, the best of all counts; and their seed.
@@ -128,8 +128,8 @@ pub fn prefilters(compiled: &Compiled, records: &[&Record]) -> Result<Vec<Prefil
 /// Fits the study's parameters to `records`.
 ///
 /// # Errors
-/// The model cannot be simulated at the start values, or they lie outside their bounds; the definition of the error does not fit the
-/// study, or has no use for what is asked for beside it.
+/// The model cannot be simulated at the start values, or they lie outside their bounds; the definition of the error
+/// does not fit the study, or has no use for what is asked for beside it.
 pub fn fit(
     compiled: &Compiled,
     records: &[&Record],
@@ -242,7 +242,8 @@ pub(super) fn prior_rows(study: &Study) -> Vec<PriorRow> {
     own.collect()
 }
 
-/// Levenberg-Marquardt with the study's bounds, constraints and prior knowledge; the best of all searches, and the costs of all.
+/// Levenberg-Marquardt with the study's bounds, constraints and prior knowledge; the best of all searches, and the
+/// costs of all.
 fn minimise(
     compiled: &Compiled,
     problem: &mut Problem,

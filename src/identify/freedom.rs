@@ -1,8 +1,8 @@
 //! How well the covariance itself is known: degrees of freedom behind the intervals (Satterthwaite-1946).
 //!
-//! The covariance is linear in the level of every channel's noise and smooth in the coefficients of its colour, both of which
-//! are estimates. The variance of a variance V then gives the number of independent samples that would leave it as uncertain, 2 V^2
-//! over its variance.
+//! The covariance is linear in the level of every channel's noise and smooth in the coefficients of its colour, both of
+//! which are estimates. The variance of a variance V then gives the number of independent samples that would leave it
+//! as uncertain, 2 V^2 over its variance.
 
 use super::fitting::Fitted;
 use super::noise::{NoiseModel, combined, every};
@@ -39,7 +39,8 @@ impl Spread {
         Self { parts }
     }
 
-    /// Degrees of freedom of the variance of a linear function of the parameters with this gradient; infinite where it has none.
+    /// Degrees of freedom of the variance of a linear function of the parameters with this gradient; infinite where it
+    /// has none.
     pub fn freedom(&self, covariance: &[f64], gradient: &[f64]) -> f64 {
         let count = gradient.len();
         let form = |matrix: &[f64]| -> f64 {
@@ -55,7 +56,8 @@ impl Spread {
     }
 }
 
-/// One part per independent combination of a model's coefficients; `shaped`: per phase the columns as the model shapes them.
+/// One part per independent combination of a model's coefficients; `shaped`: per phase the columns as the model shapes
+/// them.
 fn by_colour(noise: &NoiseModel, shaped: &[Vec<Vec<f64>>], samples: f64) -> Vec<Vec<f64>> {
     let order = noise.model.order();
     // Cov(a) = R^-1 / n, R the autocovariance relative to the variance of the innovations.

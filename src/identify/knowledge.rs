@@ -4,12 +4,12 @@ use super::confidence::RANK_THRESHOLD;
 use crate::fit::PriorRow;
 use crate::statistics::Covariance;
 
-/// What another result seems to know along a direction that the data leave open counts from this share of the strongest it
-/// knows. Less comes from the turn of its own undetermined directions between its parameters and these.
+/// What another result seems to know along a direction that the data leave open counts from this share of the strongest
+/// it knows. Less comes from the turn of its own undetermined directions between its parameters and these.
 const TURN: f64 = 0.03;
 
-/// The rows, those of other results (linearised) without their seeming knowledge along what `gradient` (of the data alone, N x p
-/// at `theta`) leaves open.
+/// The rows, those of other results (linearised) without their seeming knowledge along what `gradient` (of the data
+/// alone, N x p at `theta`) leaves open.
 pub(super) fn straightened(rows: &[PriorRow], theta: &[f64], gradient: &[f64], scales: &[f64]) -> Vec<PriorRow> {
     let mut rows = rows.to_vec();
     if !rows.iter().any(|row| row.linearised) {

@@ -14,9 +14,10 @@ const FILTER_ORDER: usize = 16;
 
 /// Stationary model of the weighted, filtered noise of one channel in one record.
 ///
-/// What a low-pass leaves of the band would make a model at the full sampling rate badly conditioned; it is made of every
-/// `stride`-th sample, all such series together. The colour that the prefilter gives is known; only that of the noise before it
-/// is estimated.
+/// What a low-pass leaves of the band would make a model at the full sampling rate badly conditioned; it is made of
+/// every
+/// `stride`-th sample, all such series together. The colour that the prefilter gives is known; only that of the noise
+/// before it is estimated.
 #[derive(Clone, Debug)]
 pub(super) struct NoiseModel {
     pub stride: usize,
@@ -68,7 +69,8 @@ pub(super) fn models(fitted: &Fitted) -> Vec<NoiseModel> {
         .collect()
 }
 
-/// Share of the noise's power that its own past predicts, per block of the residual; what the prefilter's colour predicts not counted.
+/// Share of the noise's power that its own past predicts, per block of the residual; what the prefilter's colour
+/// predicts not counted.
 pub fn predicted_shares(fitted: &Fitted) -> Vec<f64> {
     let share = |noise: NoiseModel| {
         let power = noise.model.power();
@@ -102,9 +104,9 @@ pub(super) fn every(values: &[f64], phase: usize, stride: usize) -> Vec<f64> {
     values.iter().skip(phase).step_by(stride).copied().collect()
 }
 
-/// Gamma = Phi^T S^T S Cov(D) S^T S Phi of method 3.30, p x p. `gradient`: N x p, weighted and filtered; rows after the last
-/// block are priors with variances of their own. The fitted parameters have taken their share of the residual, from which the models are:
-/// it is given back to the level (method 4.5 for coloured noise; `inverse` is Xi^+).
+/// Gamma = Phi^T S^T S Cov(D) S^T S Phi of method 3.30, p x p. `gradient`: N x p, weighted and filtered; rows after the
+/// last block are priors with variances of their own. The fitted parameters have taken their share of the residual,
+/// from which the models are: it is given back to the level (method 4.5 for coloured noise; `inverse` is Xi^+).
 pub(super) fn gamma(fitted: &Fitted, gradient: &[f64], models: &[NoiseModel], inverse: &[f64]) -> Vec<f64> {
     let count = fitted.theta.len();
     let rows = gradient.len() / count.max(1);
@@ -143,8 +145,8 @@ pub(super) fn gamma(fitted: &Fitted, gradient: &[f64], models: &[NoiseModel], in
     gamma
 }
 
-/// Factor by which the data's cost counts more than it knows, because coloured noise is weighted as if it were white: mean of the
-/// parameters' variances over those for white noise of the same level. At least 1.
+/// Factor by which the data's cost counts more than it knows, because coloured noise is weighted as if it were white:
+/// mean of the parameters' variances over those for white noise of the same level. At least 1.
 pub(super) fn inflation(compiled: &Compiled, fitted: &Fitted, threshold: f64) -> f64 {
     let count = fitted.theta.len();
     let scales: Vec<f64> = compiled.study.parameters.iter().map(crate::study::Parameter::scale).collect();
@@ -163,8 +165,9 @@ const LONGEST: usize = 400;
 /// Rounds of the completion: each time the share is a share of the noise as completed before.
 const COMPLETIONS: usize = 3;
 
-/// Gives the models back what the fitted parameters have taken of the noise (method 4.5 lag by lag): it is missing at the very
-/// frequencies at which the parameters are determined, where an average share would be too little. With the residual
+/// Gives the models back what the fitted parameters have taken of the noise (method 4.5 lag by lag): it is missing at
+/// the very frequencies at which the parameters are determined, where an average share would be too little. With the
+/// residual
 /// `(I - P) d`, `P = Phi Xi^+ Phi^T`, its autocovariance is that of the noise d less
 /// `P R + R P - P R P` on average along the diagonals. Records behind a prefilter keep the average share.
 pub(super) fn complete(fitted: &Fitted, models: &mut [NoiseModel], inverse: &[f64]) {
@@ -186,7 +189,8 @@ pub(super) fn complete(fitted: &Fitted, models: &mut [NoiseModel], inverse: &[f6
     }
 }
 
-/// Per block, at the lags up to the model's order: what the residual's autocovariance lacks of the noise's if that is as the models say.
+/// Per block, at the lags up to the model's order: what the residual's autocovariance lacks of the noise's if that is
+/// as the models say.
 fn taken(fitted: &Fitted, models: &[NoiseModel], inverse: &[f64]) -> Vec<Vec<f64>> {
     let (count, rows) = (fitted.theta.len(), fitted.residual.len());
     let column =

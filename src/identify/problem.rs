@@ -1,7 +1,7 @@
 //! A study's experiments as one least-squares problem.
 //!
-//! The residual is `S F (Y_measured - Y(theta))`, record by record, channel by channel: F the zero-phase prefilter (or the
-//! identity), S the channels' weights. Its gradient passes through the same chain (internal differentiation).
+//! The residual is `S F (Y_measured - Y(theta))`, record by record, channel by channel: F the zero-phase prefilter (or
+//! the identity), S the channels' weights. Its gradient passes through the same chain (internal differentiation).
 
 use crate::fit::{EvaluationFailure, LeastSquares, transformed};
 use crate::signal::{AutoRegression, Prefilter};

@@ -28,8 +28,8 @@ pub struct Profile {
     pub parameter: String,
     pub unit: String,
     pub values: Vec<f64>,
-    /// Rise of the cost above its minimum with all other parameters fitted anew, in units of the noise's effect: the square of the
-    /// distance in standard deviations where the model is linear.
+    /// Rise of the cost above its minimum with all other parameters fitted anew, in units of the noise's effect: the
+    /// square of the distance in standard deviations where the model is linear.
     pub deviance: Vec<f64>,
     /// Deviance at the ends of the 95 % interval.
     pub limit: f64,
@@ -38,10 +38,12 @@ pub struct Profile {
     pub upper: Option<f64>,
 }
 
-/// Profiles of the parameters with these indices, under the weights of the fit: its noise models, or the gains of its state estimator.
+/// Profiles of the parameters with these indices, under the weights of the fit: its noise models, or the gains of its
+/// state estimator.
 ///
 /// # Errors
-/// A filter that cannot be designed for a record; a parameter that cannot be moved at all; the equation error, which has no likelihood.
+/// A filter that cannot be designed for a record; a parameter that cannot be moved at all; the equation error, which
+/// has no likelihood.
 pub fn profiles(
     compiled: &Compiled,
     fitted: &Fitted,

@@ -223,8 +223,8 @@ fn rounding_remarks(compiled: &Compiled, fitted: &Fitted, confidence: &Confidenc
 
 /// Gaps between stretches above this share of a state's course are told: they are closed below 1e-5.
 const OPEN_GAP: f64 = 1e-3;
-/// Rounding errors of a signal with less noise than a third of the step are no longer independent of it (Widrow-1961): the variance
-/// q^2 / 12 is then this share of all.
+/// Rounding errors of a signal with less noise than a third of the step are no longer independent of it (Widrow-1961):
+/// the variance q^2 / 12 is then this share of all.
 const MOSTLY_ROUNDING: f64 = 0.43;
 
 fn number(value: f64) -> String {

@@ -28,7 +28,8 @@ pub struct SavedResult {
     /// Names of the records that the result is from: results of the same records are not independent.
     pub records: Vec<String>,
     pub parameters: Vec<SavedParameter>,
-    /// Inverse covariance in the parameters' units, rows in their order; zero along directions that were not determined.
+    /// Inverse covariance in the parameters' units, rows in their order; zero along directions that were not
+    /// determined.
     pub information: Vec<Vec<f64>>,
 }
 

@@ -22,10 +22,11 @@ pub struct Candidate<'a> {
     pub records: &'a [Record],
 }
 
-/// One [`Structure`] per candidate, compared with the first. Empty where the candidates do not compare the same samples.
+/// One [`Structure`] per candidate, compared with the first. Empty where the candidates do not compare the same
+/// samples.
 ///
-/// All count their residuals alike: what a sample is worth is taken from the candidate whose residual is most coloured, so that a
-/// better model is not favoured for the whiter residual it leaves.
+/// All count their residuals alike: what a sample is worth is taken from the candidate whose residual is most coloured,
+/// so that a better model is not favoured for the whiter residual it leaves.
 pub fn structures(candidates: &[Candidate]) -> Vec<Structure> {
     let Some(base) = candidates.first() else { return Vec::new() };
     let rows = |candidate: &Candidate| {
@@ -91,8 +92,8 @@ fn is_nested(base: &Candidate, candidate: &Candidate) -> bool {
     own.len() > base.fitted.theta.len() && names(base).iter().all(|name| own.contains(name))
 }
 
-/// Test of two structures of which neither contains the other, with Schwarz's correction (Vuong-1989): z is positive where the
-/// candidate is better; the variance counts every sample as what it is worth.
+/// Test of two structures of which neither contains the other, with Schwarz's correction (Vuong-1989): z is positive
+/// where the candidate is better; the variance counts every sample as what it is worth.
 fn vuong(base: &Candidate, candidate: &Candidate, all: f64) -> Option<(f64, f64)> {
     let mut ratios = Vec::new();
     for (index, block) in base.fitted.blocks.iter().enumerate() {
@@ -117,8 +118,8 @@ fn vuong(base: &Candidate, candidate: &Candidate, all: f64) -> Option<(f64, f64)
     Some((z, 2.0 * normal_probability(-z.abs())))
 }
 
-/// Relative change of the root of the held-out sum of squares against the base, with its 95 % interval by a moving-block
-/// bootstrap: (change, low, high).
+/// Relative change of the root of the held-out sum of squares against the base, with its 95 % interval by a
+/// moving-block bootstrap: (change, low, high).
 fn held_out_change(base: &Candidate, candidate: &Candidate) -> Option<(f64, f64, f64)> {
     let held_out = |of: &Candidate| -> Option<Vec<Vec<f64>>> {
         let records: Vec<&Record> = of.records.iter().filter(|record| record.role == Role::Validation).collect();

@@ -1,4 +1,5 @@
-//! Channels that look as if the record was wrong, not the model: reversed signs, wrong units, swapped columns, single wild samples.
+//! Channels that look as if the record was wrong, not the model: reversed signs, wrong units, swapped columns, single
+//! wild samples.
 
 use super::{ChannelFit, RecordFit};
 use crate::quantities::format_number;

@@ -70,8 +70,8 @@ pub(super) fn first_weights(study: &Study, records: &[&Record], filters: &[Prefi
     weighting
 }
 
-/// Weights from the residual of a fit with `parameter_count` parameters; stated noise stays. `gains`: share of white noise's
-/// variance that passes each record's prefilter, so that weights refer to the noise before it (method 4.6).
+/// Weights from the residual of a fit with `parameter_count` parameters; stated noise stays. `gains`: share of white
+/// noise's variance that passes each record's prefilter, so that weights refer to the noise before it (method 4.6).
 pub(super) fn residual_deviations(
     current: &Weighting,
     study: &Study,

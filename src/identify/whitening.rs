@@ -76,9 +76,9 @@ fn inverse_information(gradient: &[f64], count: usize, scales: &[f64]) -> Option
     Covariance::new(gradient, scales, 1.0, None, RANK_THRESHOLD).ok().map(|covariance| covariance.matrix)
 }
 
-/// What the residual's autocovariance lacks of the noise's at the lags 0 ..= `order`, because the fitted parameters have taken it:
-/// with weights that know the colour it is `Phi Xi^+ Phi^T`, on average along its diagonals. The gradient before the
-/// whitening is that of the first fit.
+/// What the residual's autocovariance lacks of the noise's at the lags 0 ..= `order`, because the fitted parameters
+/// have taken it: with weights that know the colour it is `Phi Xi^+ Phi^T`, on average along its diagonals. The
+/// gradient before the whitening is that of the first fit.
 fn share(white: &Fitted, block: usize, inverse: &[f64], order: usize) -> Vec<f64> {
     let (rows, range) = (white.residual.len().max(1), white.blocks[block].rows.clone());
     let phi: Vec<Vec<f64>> = white.gradient.chunks_exact(rows).map(|column| column[range.clone()].to_vec()).collect();

@@ -108,8 +108,8 @@ impl<'d> Augmented<'d> {
         self.dynamics.expanded_jacobian(t.min(self.last_time), y, c, scale, values);
     }
 
-    /// `-(dF/dy' V + dF/dtheta)` into `result` (n x p row by row). Where derivatives have factors of their own, `self.jacobian` must
-    /// hold the values at this point for `c`, which must not be zero.
+    /// `-(dF/dy' V + dF/dtheta)` into `result` (n x p row by row). Where derivatives have factors of their own,
+    /// `self.jacobian` must hold the values at this point for `c`, which must not be zero.
     pub fn sensitivity_right_hand_side(
         &mut self,
         t: f64,

@@ -17,20 +17,21 @@ const NEWTON_RETREAT: f64 = 0.25;
 const MILD: f64 = 0.5;
 const SMALLEST_FACTOR: f64 = 0.25;
 const SAFETY: f64 = 0.9;
-/// Errors between the ends of steps may be larger than at the ends by the inverse of this; chosen by trial on mechanisms with loops.
+/// Errors between the ends of steps may be larger than at the ends by the inverse of this; chosen by trial on
+/// mechanisms with loops.
 const INTERPOLATED_SHARE: f64 = 0.03;
 /// First step: the change along the initial slope stays below this in the error norm ...
 const FIRST_CHANGE: f64 = 0.5;
 /// ... and the step below this share of the span.
 const FIRST_SHARE: f64 = 1e-3;
 
-/// The filtered differences of runs with sensitivities, whose matrix is another one in every step, are filtered anew after so
-/// many of them, a number chosen by trial; they only choose the order.
+/// The filtered differences of runs with sensitivities, whose matrix is another one in every step, are filtered anew
+/// after so many of them, a number chosen by trial; they only choose the order.
 const FILTERED_STEPS: usize = 10;
 
 pub(super) struct Bdf {
-    /// Where errors are filtered ([`Newton::filter`]), the differences carry themselves filtered behind themselves: as long
-    /// as the matrix stays, filtering the correction of a step filters all of them.
+    /// Where errors are filtered ([`Newton::filter`]), the differences carry themselves filtered behind themselves: as
+    /// long as the matrix stays, filtering the correction of a step filters all of them.
     history: History,
     newton: Newton,
     norm: ErrorNorm,

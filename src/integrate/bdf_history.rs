@@ -1,6 +1,7 @@
 //! The past of a BDF integration as scaled divided differences, and the coefficients that follow from it.
 //!
-//! Fixed-leading-coefficient form of the variable-step BDF (Brenan-Campbell-Petzold-1996, 5.2; names there in brackets).
+//! Fixed-leading-coefficient form of the variable-step BDF (Brenan-Campbell-Petzold-1996, 5.2; names there in
+//! brackets).
 
 pub(super) const MAXIMUM_ORDER: usize = 5;
 /// Differences kept: orders 0 to 5.

@@ -1,7 +1,7 @@
 //! Derivatives of the differential components and values of the algebraic ones that satisfy the equations.
 //!
-//! Constraints on the differential components hold already; in their place stand their derivatives with respect to time,
-//! which determine the multipliers (Brenan-Campbell-Petzold-1996, 5.3).
+//! Constraints on the differential components hold already; in their place stand their derivatives with respect to
+//! time, which determine the multipliers (Brenan-Campbell-Petzold-1996, 5.3).
 
 use super::augmented::Augmented;
 use super::stepper::first_not_finite;
@@ -41,8 +41,8 @@ struct Equations {
     by_y: Vec<f64>,
 }
 
-/// Solves `F(t, y, y') = 0` for the derivatives of the differential and the values of the algebraic components, then the
-/// linear equations that their sensitivities satisfy. Differential values and their sensitivities stay; they must
+/// Solves `F(t, y, y') = 0` for the derivatives of the differential and the values of the algebraic components, then
+/// the linear equations that their sensitivities satisfy. Differential values and their sensitivities stay; they must
 /// satisfy the constraints. Explicit dependence of constraints on time is differenced over `time_step` from `t` on.
 pub(super) fn make_consistent(
     system: &mut Augmented,

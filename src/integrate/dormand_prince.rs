@@ -1,5 +1,5 @@
-//! Coefficients of the explicit Runge-Kutta method of order 8 with error estimates of order 5 and 3 and an interpolant of
-//! order 7 by Dormand and Prince, as given in Hairer-Norsett-Wanner-1993 (II.5, II.6 and the code there).
+//! Coefficients of the explicit Runge-Kutta method of order 8 with error estimates of order 5 and 3 and an interpolant
+//! of order 7 by Dormand and Prince, as given in Hairer-Norsett-Wanner-1993 (II.5, II.6 and the code there).
 
 /// A sum over stages: (stage, coefficient).
 pub(super) type Row = &'static [(usize, f64)];

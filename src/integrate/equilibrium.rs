@@ -40,8 +40,8 @@ pub struct Equilibrium {
 /// The equation of an unknown component is its row of F. Where that row holds no unknown (a position whose velocity is
 /// given), the rows of the components it does hold take its place (the acceleration of that position).
 ///
-/// Method: Newton steps on the equations scaled by the typical magnitudes, damped as in Levenberg-Marquardt where a full
-/// step does not reduce the residual (More-1978). Sensitivities follow from the implicit function theorem.
+/// Method: Newton steps on the equations scaled by the typical magnitudes, damped as in Levenberg-Marquardt where a
+/// full step does not reduce the residual (More-1978). Sensitivities follow from the implicit function theorem.
 ///
 /// # Errors
 ///

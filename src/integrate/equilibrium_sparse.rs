@@ -1,5 +1,5 @@
-//! Equilibrium of large systems by Newton's method with a sparse factorisation. Whatever is not plain sailing is left to
-//! the search by singular values, which costs the cube of the dimension and can say what is wrong.
+//! Equilibrium of large systems by Newton's method with a sparse factorisation. Whatever is not plain sailing is left
+//! to the search by singular values, which costs the cube of the dimension and can say what is wrong.
 
 use super::problem::{Dynamics, Work};
 use super::stepper::first_not_finite;

@@ -109,8 +109,8 @@ impl Events {
         None
     }
 
-    /// First instant known to lie behind the zero between `left` and `right`, to rounding; bisection and false position in
-    /// turn, so that neither flat nor steep functions are slow.
+    /// First instant known to lie behind the zero between `left` and `right`, to rounding; bisection and false position
+    /// in turn, so that neither flat nor steep functions are slow.
     fn locate(
         &mut self,
         system: &mut Augmented,

@@ -1,8 +1,8 @@
 //! Kinks of the right-hand side within explicit steps.
 //!
-//! A step across a kink has an error that falls with the size of the step only, not with its order; sensitivities, whose
-//! right-hand side jumps there, suffer most. So a step that would cross a kink ends at it, and the next one begins on its other
-//! side (Hairer-Norsett-Wanner-1993, II.6).
+//! A step across a kink has an error that falls with the size of the step only, not with its order; sensitivities,
+//! whose right-hand side jumps there, suffer most. So a step that would cross a kink ends at it, and the next one
+//! begins on its other side (Hairer-Norsett-Wanner-1993, II.6).
 
 use super::augmented::Augmented;
 use std::sync::Arc;
@@ -102,7 +102,8 @@ impl Kinks {
         self.harmful[kink.index] = true;
     }
 
-    /// The first change of `sides` in a step of length `h` from `t`; `interpolate` gives the state at a share of the step.
+    /// The first change of `sides` in a step of length `h` from `t`; `interpolate` gives the state at a share of the
+    /// step.
     pub fn find(
         &mut self,
         system: &mut Augmented,

@@ -39,8 +39,9 @@ use segments::{first_clocks, segments};
 /// `breakpoints` are times at which the right-hand side may jump (steps of an input): a step ends exactly there and the
 /// method starts anew. Right-hand sides are taken as continuous from the right; up to a breakpoint they are evaluated
 /// just before it. At the zeros of switching functions the state is reset and the method starts anew likewise; a
-/// requested time that coincides with an event gets the values before it, also where a clock ticks ([`Dynamics::tick`]). Requested times do not shorten steps. Sensitivities are computed where `start.sensitivity` is given,
-/// as exact derivatives of the discrete solution for the steps taken.
+/// requested time that coincides with an event gets the values before it, also where a clock ticks
+/// ([`Dynamics::tick`]). Requested times do not shorten steps. Sensitivities are computed where `start.sensitivity` is
+/// given, as exact derivatives of the discrete solution for the steps taken.
 ///
 /// # Errors
 ///

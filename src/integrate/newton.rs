@@ -87,12 +87,12 @@ pub(super) struct Newton {
     /// Leading coefficient of the last step solved.
     last_leading: f64,
     delta: Vec<f64>,
-    /// `c dF/dy'` at the last renewal, for [`Newton::filter`]; empty where there is nothing to filter or the factor of every
-    /// derivative is one.
+    /// `c dF/dy'` at the last renewal, for [`Newton::filter`]; empty where there is nothing to filter or the factor of
+    /// every derivative is one.
     mass: Vec<f64>,
     has_hidden_algebraic: bool,
-    /// For `y' = f`: a bound of the eigenvalues of f_y (row sums in typical magnitudes) at the last renewal; infinite where
-    /// it is not known.
+    /// For `y' = f`: a bound of the eigenvalues of f_y (row sums in typical magnitudes) at the last renewal; infinite
+    /// where it is not known.
     pub eigenvalue_bound: f64,
     filtered: Vec<f64>,
     /// How often the matrix has been renewed.
@@ -159,8 +159,8 @@ impl Newton {
     }
 
     /// Replaces an error by what it does to the solution, `J^-1 c dF/dy' e`, where some combinations of differential
-    /// components are in fact algebraic. These are found anew in every step, so that their differences say nothing about
-    /// errors; they follow the error of the others (Hairer-Wanner-1996, IV.8).
+    /// components are in fact algebraic. These are found anew in every step, so that their differences say nothing
+    /// about errors; they follow the error of the others (Hairer-Wanner-1996, IV.8).
     pub fn filter(&mut self, system: &Augmented, error: &mut [f64]) {
         if !self.has_hidden_algebraic {
             return;

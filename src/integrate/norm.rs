@@ -7,20 +7,21 @@ const GUESS_SHARE: f64 = 0.01;
 /// Keeps the weights of columns that are still zero finite.
 const SMALLEST_COLUMN: f64 = 1e-150;
 
-/// A last correction of the multipliers by this multiple of the relative tolerance may stay: they are one differentiation away from the
-/// velocities, which err by the tolerance itself. Chosen by trial: with less, steps grow to where the velocities between them miss
-/// the constraints by more than ten times the tolerance; with more, multipliers err by percents now and then.
+/// A last correction of the multipliers by this multiple of the relative tolerance may stay: they are one
+/// differentiation away from the velocities, which err by the tolerance itself. Chosen by trial: with less, steps grow
+/// to where the velocities between them miss the constraints by more than ten times the tolerance; with more,
+/// multipliers err by percents now and then.
 const MULTIPLIER_SHARE: f64 = 2e4;
 
-/// What a step leaves of the amplitude of a component, and the share of it that counts as its size. Chosen by trial on oscillations
-/// with dry friction: 5 % fewer evaluations of the state and 10 % fewer of its sensitivities for the same error; a larger share makes
-/// errors scatter.
+/// What a step leaves of the amplitude of a component, and the share of it that counts as its size. Chosen by trial on
+/// oscillations with dry friction: 5 % fewer evaluations of the state and 10 % fewer of its sensitivities for the same
+/// error; a larger share makes errors scatter.
 const AMPLITUDE_MEMORY: f64 = 0.999;
 const AMPLITUDE_SHARE: f64 = 0.3;
 
 /// Weights of the error control: component i of the state may err by `relative |y_i| + absolute_i`, the sensitivity of
-/// component i to parameter j by `relative |S_ij| + absolute_i / parameter_scale_j`. Instead of the value a share of its recent amplitude
-/// counts, where it is larger ([`ErrorNorm::by_amplitude`]).
+/// component i to parameter j by `relative |S_ij| + absolute_i / parameter_scale_j`. Instead of the value a share of
+/// its recent amplitude counts, where it is larger ([`ErrorNorm::by_amplitude`]).
 ///
 /// The error of the state and of each sensitivity column is the root mean square of the scaled errors of the
 /// differential components; the norm is the largest of these. Algebraic components do not count: their error follows
@@ -91,7 +92,8 @@ impl ErrorNorm {
         }
     }
 
-    /// Measures errors by recent amplitudes, too: a component that swings through zero is no more exact there than elsewhere.
+    /// Measures errors by recent amplitudes, too: a component that swings through zero is no more exact there than
+    /// elsewhere.
     pub fn by_amplitude(mut self) -> Self {
         self.memory = AMPLITUDE_MEMORY;
         self
@@ -185,8 +187,9 @@ impl ErrorNorm {
         Size { norm: finite_root(sum * self.inverse_count), component }
     }
 
-    /// Root mean square of a correction of the state, for the convergence of Newton's method. Multipliers of constraints
-    /// do not count: the rounding errors of a step of length h appear in them divided by h (Hairer-Lubich-Roche-1989).
+    /// Root mean square of a correction of the state, for the convergence of Newton's method. Multipliers of
+    /// constraints do not count: the rounding errors of a step of length h appear in them divided by h
+    /// (Hairer-Lubich-Roche-1989).
     pub fn of_correction(&self, correction: &[f64]) -> f64 {
         let elements = correction[..self.n].iter().zip(&self.inverse_weight).zip(&self.is_multiplier);
         let sum: f64 =
@@ -194,8 +197,9 @@ impl ErrorNorm {
         finite_root(sum / self.n as f64)
     }
 
-    /// Whether a correction moves the multipliers by little of the largest of them. What an iteration leaves in them the prediction
-    /// of the next step multiplies; where constraints hold the states all the same, nothing else would stop it from growing.
+    /// Whether a correction moves the multipliers by little of the largest of them. What an iteration leaves in them
+    /// the prediction of the next step multiplies; where constraints hold the states all the same, nothing else would
+    /// stop it from growing.
     pub fn multipliers_rest(&self, correction: &[f64], y: &[f64]) -> bool {
         let (mut moved, mut size) = (0.0_f64, 1.0_f64);
         let elements = correction.iter().zip(y).zip(&self.inverse_scale).zip(&self.is_multiplier);

@@ -6,11 +6,11 @@ use crate::linear::SparsityPattern;
 ///
 /// Systems of index 2 have Hessenberg form: `x' = f(t, x, w)`, `0 = c(t, x)`, where f may contain further algebraic
 /// components with equations of their own. Mechanisms with loops are brought to it by the method of
-/// Gear-Gupta-Leimkuhler-1985: constraints on position and on velocity level, a multiplier for each. Which equations are
-/// constraints and which components their multipliers is found from the entries of the Jacobian.
+/// Gear-Gupta-Leimkuhler-1985: constraints on position and on velocity level, a multiplier for each. Which equations
+/// are constraints and which components their multipliers is found from the entries of the Jacobian.
 ///
-/// `n` = [`Dynamics::dimension`], `p` = [`Dynamics::parameter_count`]. Methods take `&mut self` so that an implementation may
-/// keep scratch memory. Non-finite results are allowed; the integrator treats them as a failed step.
+/// `n` = [`Dynamics::dimension`], `p` = [`Dynamics::parameter_count`]. Methods take `&mut self` so that an
+/// implementation may keep scratch memory. Non-finite results are allowed; the integrator treats them as a failed step.
 pub trait Dynamics {
     fn dimension(&self) -> usize;
 
@@ -31,15 +31,16 @@ pub trait Dynamics {
     /// Values of dF/dy + c dF/dy' in the order of [`Dynamics::pattern`].
     fn jacobian(&mut self, t: f64, y: &[f64], y_prime: &[f64], c: f64, values: &mut [f64]);
 
-    /// Structure of a square matrix that has further unknowns behind the n components, each with an equation of its own behind
-    /// those of F, and from which dF/dy + c dF/dy' follows by their elimination. Given for large systems of the form
+    /// Structure of a square matrix that has further unknowns behind the n components, each with an equation of its own
+    /// behind those of F, and from which dF/dy + c dF/dy' follows by their elimination. Given for large systems of the
+    /// form
     /// `y' = f`, `0 = g` where it has far fewer entries than the Jacobian itself.
     fn expanded_pattern(&self) -> Option<&SparsityPattern> {
         None
     }
 
-    /// Values of that matrix in the order of [`Dynamics::expanded_pattern`], the columns of components in units of `scale`
-    /// (positive, length n). Must be given along with a pattern.
+    /// Values of that matrix in the order of [`Dynamics::expanded_pattern`], the columns of components in units of
+    /// `scale` (positive, length n). Must be given along with a pattern.
     fn expanded_jacobian(&mut self, _t: f64, _y: &[f64], _c: f64, _scale: &[f64], _values: &mut [f64]) {}
 
     /// dF/dtheta, n x p column-major.
@@ -69,8 +70,8 @@ pub trait Dynamics {
     }
 
     /// `f`, dF/dy (values of [`Dynamics::jacobian`] with c = 0) and [`Dynamics::parameter_entries`] at one point, for
-    /// systems with [`Dynamics::explicit_rates`]. One call, so that an implementation can share common work; this is the
-    /// inner loop of explicit integration with sensitivities.
+    /// systems with [`Dynamics::explicit_rates`]. One call, so that an implementation can share common work; this is
+    /// the inner loop of explicit integration with sensitivities.
     fn linearised_rates(
         &mut self,
         t: f64,
@@ -95,8 +96,8 @@ pub trait Dynamics {
     /// Values of these functions.
     fn kinks(&mut self, _t: f64, _y: &[f64], _values: &mut [f64]) {}
 
-    /// From now on the right-hand side and its derivatives are those of one side of each kink, whatever the function's value:
-    /// that of negative values where true. They are smooth then. Without sides the values decide again.
+    /// From now on the right-hand side and its derivatives are those of one side of each kink, whatever the function's
+    /// value: that of negative values where true. They are smooth then. Without sides the values decide again.
     fn hold_sides(&mut self, _sides: Option<&[bool]>) {}
 
     /// Number of switching functions: as long as none changes its sign, the right-hand side is smooth.
@@ -135,7 +136,8 @@ pub trait Dynamics {
         false
     }
 
-    /// Periods of clocks, s, positive: at all multiples of them from the start on the state changes by [`Dynamics::tick`].
+    /// Periods of clocks, s, positive: at all multiples of them from the start on the state changes by
+    /// [`Dynamics::tick`].
     fn clock_periods(&self) -> &[f64] {
         &[]
     }
@@ -208,8 +210,8 @@ pub struct Options {
     /// Keep the sequence of steps in [`Solution::plan`].
     pub record_plan: bool,
     /// Follow this sequence of steps instead of controlling the error: the solution becomes a smooth function of the
-    /// parameters, whose derivative the sensitivities of the recorded run are (internal differentiation). Impossible for
-    /// systems with switching functions, whose events move with the parameters.
+    /// parameters, whose derivative the sensitivities of the recorded run are (internal differentiation). Impossible
+    /// for systems with switching functions, whose events move with the parameters.
     pub follow_plan: Option<std::sync::Arc<Plan>>,
 }
 

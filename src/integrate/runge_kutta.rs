@@ -1,4 +1,5 @@
-//! Explicit Runge-Kutta methods of order 5 and 8 with error control, interpolation and exact derivatives of their stages.
+//! Explicit Runge-Kutta methods of order 5 and 8 with error control, interpolation and exact derivatives of their
+//! stages.
 
 use super::augmented::Augmented;
 use super::kinks::Kinks;
@@ -30,8 +31,8 @@ const THIRD_ORDER_SHARE: f64 = 0.1;
 /// method of order 5 does; this factor makes up for it.
 const CAUTION: f64 = 10.0;
 
-/// Attempts among which rejections of the method of order 8 are counted, and how many of them show kinks: about a smooth
-/// solution it rejects a few. Chosen by trial on smooth and on kinked problems, which lie far on either side.
+/// Attempts among which rejections of the method of order 8 are counted, and how many of them show kinks: about a
+/// smooth solution it rejects a few. Chosen by trial on smooth and on kinked problems, which lie far on either side.
 const WATCHED_ATTEMPTS: u32 = 200;
 const REJECTED_AT_KINKS: u32 = 60;
 
@@ -338,7 +339,8 @@ impl RungeKutta {
         Ok(())
     }
 
-    /// Whether so many of the last attempts were rejected that a method of lower order gets further; to be asked after a step.
+    /// Whether so many of the last attempts were rejected that a method of lower order gets further; to be asked after
+    /// a step.
     pub fn meets_kinks(&mut self) -> bool {
         if self.pair == Pair::Five || self.attempts < WATCHED_ATTEMPTS {
             return false;

@@ -1,7 +1,7 @@
 //! Start values that satisfy the constraints, and how they depend on the parameters.
 //!
-//! The nearest point on the constraints, measured in typical magnitudes. Positions come first and velocities after them:
-//! constraints on positions would else be met by moving what should only follow.
+//! The nearest point on the constraints, measured in typical magnitudes. Positions come first and velocities after
+//! them: constraints on positions would else be met by moving what should only follow.
 
 use super::augmented::Augmented;
 use super::problem::{Dynamics, Failure, FailureCause, Start};
@@ -70,8 +70,9 @@ struct Stage {
 }
 
 /// Splits the constraints into those on positions and those on velocities. Components whose rates hold common
-/// multipliers form a class; constraints that touch a single class come first and settle it, the others follow. Velocities may have
-/// constraints of their own, those of linear couplings, but of constraints that touch positions, too, positions have more of their own.
+/// multipliers form a class; constraints that touch a single class come first and settle it, the others follow.
+/// Velocities may have constraints of their own, those of linear couplings, but of constraints that touch positions,
+/// too, positions have more of their own.
 fn stages(system: &mut Augmented, t: f64, y: &[f64], fixed: &[bool]) -> Vec<Stage> {
     let n = system.n;
     let by_y = entries(system.dynamics, t, y, &vec![0.0; n]).by_y;

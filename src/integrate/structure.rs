@@ -16,11 +16,11 @@ pub(super) struct Structure {
     pub is_constraint: Vec<bool>,
     /// Those rows, ascending.
     pub constraints: Vec<usize>,
-    /// Algebraic components that the algebraic equations alone do not determine, length n: multipliers, and what is defined
-    /// by them (a reaction that a friction depends on).
+    /// Algebraic components that the algebraic equations alone do not determine, length n: multipliers, and what is
+    /// defined by them (a reaction that a friction depends on).
     pub is_multiplier: Vec<bool>,
-    /// Some combinations of differential components are in fact algebraic: constraints tie them together, or derivatives
-    /// stand in rows of other components.
+    /// Some combinations of differential components are in fact algebraic: constraints tie them together, or
+    /// derivatives stand in rows of other components.
     pub has_hidden_algebraic: bool,
     /// Every derivative stands with factor one in the row of its own component, and nowhere else.
     pub has_unit_mass: bool,
@@ -65,8 +65,8 @@ impl Structure {
     }
 }
 
-/// Algebraic components are multipliers unless the algebraic equations that tie them together are as many as they. `tied`:
-/// equation and component.
+/// Algebraic components are multipliers unless the algebraic equations that tie them together are as many as they.
+/// `tied`: equation and component.
 fn multipliers(differential: &[bool], tied: &[(usize, usize)]) -> Vec<bool> {
     let n = differential.len();
     // Components first, then equations.

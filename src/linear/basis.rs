@@ -14,7 +14,8 @@ pub struct Basis {
 }
 
 impl Basis {
-    /// From `columns`, rows x count column-major. Columns are scaled to unit length first, so their units do not matter.
+    /// From `columns`, rows x count column-major. Columns are scaled to unit length first, so their units do not
+    /// matter.
     pub fn new(columns: &[f64], rows: usize) -> Self {
         let count = columns.len().checked_div(rows).unwrap_or(0);
         let mut matrix = DMatrix::from_column_slice(rows, count, columns);

@@ -49,8 +49,8 @@ impl DenseBlock {
         self.below[column * self.size + row] = value;
     }
 
-    /// `A - C B = L U` in place, L with ones on its diagonal; false where `serves` refuses a pivot, which it sees with the largest
-    /// magnitude of the column from the pivot on.
+    /// `A - C B = L U` in place, L with ones on its diagonal; false where `serves` refuses a pivot, which it sees with
+    /// the largest magnitude of the column from the pivot on.
     pub fn factor(&mut self, serves: impl Fn(f64, f64) -> bool) -> bool {
         let n = self.size;
         if n > 0 && self.before > 0 {

@@ -85,11 +85,12 @@ fn subtract_block<const W: usize>(first: usize, (row, values, v, width, target):
     target.copy_from_slice(&sum);
 }
 
-/// Rows of a triangular matrix in the order in which a solution takes them: position of each and the end of its entries; per entry
-/// the position that it multiplies, and its value.
+/// Rows of a triangular matrix in the order in which a solution takes them: position of each and the end of its
+/// entries; per entry the position that it multiplies, and its value.
 pub(super) type TriangularRows<'a> = (&'a [[u32; 2]], &'a [u32], &'a [f64]);
 
-/// `x_i = (x_i - sum_j a_ij x_j) factor_i` row by row of `x`, which has `width` columns; factors of one where none are given.
+/// `x_i = (x_i - sum_j a_ij x_j) factor_i` row by row of `x`, which has `width` columns; factors of one where none are
+/// given.
 pub(super) fn eliminate_rows(triangle: TriangularRows, x: &mut [f64], width: usize, factors: Option<&[f64]>) {
     eliminate_all_rows(triangle, x, width, factors);
 }

@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 const STRENGTHS: [f64; 13] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0, 10.0];
 
 /// Minimises `|target - columns x|^2 + lambda |D x|^2` with second differences D and lambda by generalised
-/// cross-validation (Golub-Heath-Wahba-1979). `columns` is rows x count column-major; `independent` is the number of independent
-/// rows (coloured residuals have fewer than `rows`).
+/// cross-validation (Golub-Heath-Wahba-1979). `columns` is rows x count column-major; `independent` is the number of
+/// independent rows (coloured residuals have fewer than `rows`).
 ///
 /// Returns the solution and the share of the target's sum of squares that it explains; `None` for non-finite input.
 pub fn smooth_least_squares(columns: &[f64], rows: usize, target: &[f64], independent: f64) -> Option<(Vec<f64>, f64)> {

@@ -17,7 +17,8 @@ const PREFER_DIAGONAL: f64 = 0.1;
 const REUSE_PIVOT: f64 = 1e-3;
 /// A column whose largest remaining scaled entry is below this counts as dependent.
 const SINGULAR: f64 = 1e-15;
-/// From the position on from which the factors are this full they are stored and eliminated without gaps; chosen by trial.
+/// From the position on from which the factors are this full they are stored and eliminated without gaps; chosen by
+/// trial.
 const DENSE_SHARE: f64 = 0.6;
 const NONE: usize = usize::MAX;
 
@@ -152,8 +153,8 @@ impl SparseLu {
         is_sound
     }
 
-    /// Subtracts from the work column what the columns before it contribute; `near` only to rows before the tail: to those of the
-    /// tail a product of matrices does it at once.
+    /// Subtracts from the work column what the columns before it contribute; `near` only to rows before the tail: to
+    /// those of the tail a product of matrices does it at once.
     fn eliminate(&mut self, k: usize, near: bool) {
         for u in self.upper.column(k) {
             let j = self.upper.rows[u];
@@ -411,7 +412,8 @@ impl SparseLu {
         let n = self.columns.len();
         let mut begins = vec![0_usize; n + 1];
         for k in 0..n {
-            // Entries of a lower column lie behind it, those of an upper one before: each counts where its block begins.
+            // Entries of a lower column lie behind it, those of an upper one before: each counts where its block
+            // begins.
             begins[k] += self.lower.column(k).len();
             self.upper.column(k).for_each(|u| begins[self.upper.rows[u]] += 1);
         }
@@ -454,8 +456,8 @@ fn by_target(entries: &[Entry], order: impl Iterator<Item = usize>) -> impl Iter
 /// A triangular factor in the order in which a solution reads it.
 #[derive(Clone, Debug, Default)]
 struct Pass {
-    /// For one right-hand side: (target, source) of the entries outside the dense block, sources before what depends on them and
-    /// entries that do not wait for each other side by side.
+    /// For one right-hand side: (target, source) of the entries outside the dense block, sources before what depends on
+    /// them and entries that do not wait for each other side by side.
     scattered: Vec<[u32; 2]>,
     from: Vec<u32>,
     values: Vec<f64>,
@@ -463,8 +465,8 @@ struct Pass {
     sources: Vec<Source>,
     dense_from: Vec<u32>,
     dense_values: Vec<f64>,
-    /// The rows that a block of right-hand sides needs outside the dense block, as [`TriangularRows`], and where their values come
-    /// from.
+    /// The rows that a block of right-hand sides needs outside the dense block, as [`TriangularRows`], and where their
+    /// values come from.
     rows: Vec<[u32; 2]>,
     columns: Vec<u32>,
     row_from: Vec<u32>,
@@ -519,7 +521,8 @@ impl Pass {
         self.from = order.iter().map(|(_, _, entry)| entry.from as u32).collect();
     }
 
-    /// Takes the numbers of a factorisation; those of scattered entries times the inverse pivots of their targets, where given.
+    /// Takes the numbers of a factorisation; those of scattered entries times the inverse pivots of their targets,
+    /// where given.
     fn take_values(&mut self, triangle: &Triangle, inverse_pivot: Option<&[f64]>) {
         let factor = |target: u32| inverse_pivot.map_or(1.0, |inverse| inverse[target as usize]);
         let places = self.scattered.iter().zip(&self.from);

@@ -137,8 +137,8 @@ impl Inertia {
     }
 }
 
-/// `U / D`. Where D is an element of U (an axis along a frame's axis) the ratio folds to one, and the direction that the
-/// joint frees vanishes structurally from the inertia.
+/// `U / D`. Where D is an element of U (an axis along a frame's axis) the ratio folds to one, and the direction that
+/// the joint frees vanishes structurally from the inertia.
 fn ratio(graph: &mut Graph, along: Wrench, divisor: Node) -> Wrench {
     let one = graph.constant(1.0);
     let inverse = graph.divide(one, divisor);
@@ -318,7 +318,8 @@ fn given_acceleration(graph: &mut Graph, link: &Link) -> Option<Node> {
     }
 }
 
-/// The step inwards over a link of an elastic body: reduced inertia and bias, and for a mode its divisor and driving load.
+/// The step inwards over a link of an elastic body: reduced inertia and bias, and for a mode its divisor and driving
+/// load.
 #[allow(clippy::too_many_arguments, reason = "one step of the algorithm above, which holds all of them")]
 fn open_modes(
     graph: &mut Graph,

@@ -17,8 +17,8 @@ use crate::quantities::Dimension;
 use crate::study::{EventTrigger, ReactionQuantity, Study};
 use std::collections::HashMap;
 
-/// How fast a quaternion whose length has drifted returns to length one, 1/s: slow against every motion, so that it costs no
-/// step, and enough to make the length of a quaternion at rest determined.
+/// How fast a quaternion whose length has drifted returns to length one, 1/s: slow against every motion, so that it
+/// costs no step, and enough to make the length of a quaternion at rest determined.
 const QUATERNION_RETURN: f64 = 1.0;
 
 pub(super) fn assemble(

@@ -15,8 +15,8 @@ use std::collections::HashMap;
 pub(super) struct Assembly {
     /// Rows that are independent of those before them.
     pub kept: Vec<usize>,
-    /// Per start of the study ([`Study::starts`]), positions at which the loops are closed; the first entry stands for a study
-    /// without any.
+    /// Per start of the study ([`Study::starts`]), positions at which the loops are closed; the first entry stands for
+    /// a study without any.
     pub positions: Vec<HashMap<Symbol, f64>>,
     /// A closed position that is not special.
     pub general: HashMap<Symbol, f64>,
@@ -28,7 +28,8 @@ pub(super) struct Assembly {
 /// A row whose part independent of the rows before is smaller than this, relative to the row, is redundant.
 const INDEPENDENT: f64 = 1e-7;
 
-/// The constraints as expressions: positions and velocities per row, cosines that are positive where no joint is turned over.
+/// The constraints as expressions: positions and velocities per row, cosines that are positive where no joint is turned
+/// over.
 pub(super) struct Constraints<'a> {
     pub rows: &'a [Row],
     pub positions: &'a [Node],
@@ -242,8 +243,8 @@ fn cannot_move(study: &Study, rows: &[Row]) -> Diagnostic {
     diagnostic.help("remove a joint, replace it by one with more freedom, or prescribe a motion")
 }
 
-/// One warning per joint with redundant constraints, with the joint that would do without them; one per coupling that says nothing
-/// new anywhere.
+/// One warning per joint with redundant constraints, with the joint that would do without them; one per coupling that
+/// says nothing new anywhere.
 fn redundancies(study: &Study, rows: &[Row], kept: &[usize], groups: &[Group]) -> Vec<Diagnostic> {
     let takes_turns = |row: &usize| groups.iter().any(|group| group.sets.iter().any(|set| set.contains(row)));
     let mut warnings = Vec::new();
@@ -256,7 +257,8 @@ fn redundancies(study: &Study, rows: &[Row], kept: &[usize], groups: &[Group]) -
             continue;
         }
         let Owner::Joint(index) = owner else {
-            // Where other constraints fail it decides: a parallelogram passes its flat position by the coupling of its cranks.
+            // Where other constraints fail it decides: a parallelogram passes its flat position by the coupling of its
+            // cranks.
             if dropped.iter().any(takes_turns) {
                 continue;
             }

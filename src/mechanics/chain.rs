@@ -1,7 +1,7 @@
 //! The motions of a joint that closes a loop, one after the other, as its two ends see them.
 //!
-//! Prescribed motions become part of the ends: shifts move the end's point, turns its axes, from either end inwards up to the
-//! first turn that is free. What is left between are free turns (and prescribed ones between those).
+//! Prescribed motions become part of the ends: shifts move the end's point, turns its axes, from either end inwards up
+//! to the first turn that is free. What is left between are free turns (and prescribed ones between those).
 
 use super::kinematics::{self, FrameMotion};
 use super::topology::{Seat, Tree};
@@ -134,7 +134,8 @@ impl Chain {
     }
 }
 
-/// Moves an end by the prescribed ones of its steps (`sign` -1: against their sense); returns the free shifts among them.
+/// Moves an end by the prescribed ones of its steps (`sign` -1: against their sense); returns the free shifts among
+/// them.
 fn take_up(
     graph: &mut Graph,
     seat: &mut Seat,

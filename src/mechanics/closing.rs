@@ -33,8 +33,8 @@ pub(super) fn at_closing_joint(
     }
 }
 
-/// Coordinate, rate and effect of an axis of a closing joint. Known where no shift stands between turns; of three turns the
-/// middle one must be at right angles to its neighbours, which are not parallel.
+/// Coordinate, rate and effect of an axis of a closing joint. Known where no shift stands between turns; of three turns
+/// the middle one must be at right angles to its neighbours, which are not parallel.
 pub(super) fn closing_coordinate(
     graph: &mut Graph,
     study: &Study,
@@ -79,8 +79,8 @@ fn shift(graph: &mut Graph, tree: &Tree, frames: &[FrameMotion], joint: &Joint, 
     Some(ForceGeometry { coordinate, rate, effect: Effect::Links(row.wrenches(graph, frames, sign)) })
 }
 
-/// A shift where some stand before the turns, fixed to the parent, and some behind them, fixed to the child: the distance of
-/// the ends is the sum of all, which reciprocal vectors tell apart.
+/// A shift where some stand before the turns, fixed to the parent, and some behind them, fixed to the child: the
+/// distance of the ends is the sum of all, which reciprocal vectors tell apart.
 fn shift_around(
     graph: &mut Graph,
     tree: &Tree,
@@ -171,8 +171,8 @@ fn reciprocal(directions: &[[f64; 3]], number: usize) -> [f64; 3] {
     own.map(|x| x / product)
 }
 
-/// An angle from `across` towards `beyond` to `turned`, about an axis (all in ground axes); what a unit moment on the coordinate
-/// is as a vector: reciprocal to the axes of the other turns.
+/// An angle from `across` towards `beyond` to `turned`, about an axis (all in ground axes); what a unit moment on the
+/// coordinate is as a vector: reciprocal to the axes of the other turns.
 struct Angle {
     plane: [Vector; 2],
     turned: Vector,
@@ -287,8 +287,8 @@ fn relative_turning(graph: &mut Graph, frames: &[FrameMotion], ends: &Ends) -> V
     vector::subtract(graph, fast, slow)
 }
 
-/// Quaternion (up to half a turn from the reference configuration) and angular velocity, in the child's axes, of a free rotation
-/// that closes a loop.
+/// Quaternion (up to half a turn from the reference configuration) and angular velocity, in the child's axes, of a free
+/// rotation that closes a loop.
 pub(super) fn closing_rotation(
     graph: &mut Graph,
     tree: &Tree,

@@ -7,7 +7,8 @@ use crate::expression::{Graph, Node, Symbol};
 use crate::study::{Coupling, Joint, PointMotion, Study};
 use std::collections::HashMap;
 
-/// One row per coupling of the study. `meaning` gives the kinematic symbols of the study in terms of the tree's coordinates.
+/// One row per coupling of the study. `meaning` gives the kinematic symbols of the study in terms of the tree's
+/// coordinates.
 pub(super) fn rows(
     graph: &mut Graph,
     study: &Study,

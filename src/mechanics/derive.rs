@@ -20,15 +20,15 @@ use std::collections::{HashMap, HashSet};
 
 /// The equations of motion of a study.
 ///
-/// States are ordered: joint positions, joint velocities (both in order of declaration), law states. The accelerations are
-/// explicit expressions (articulated-body algorithm, Featherstone-2008). Closed loops add multipliers
+/// States are ordered: joint positions, joint velocities (both in order of declaration), law states. The accelerations
+/// are explicit expressions (articulated-body algorithm, Featherstone-2008). Closed loops add multipliers
 /// (Gear-Gupta-Leimkuhler-1985), see [`System`].
 ///
 /// # Errors
 ///
-/// All mechanical faults found: bodies without connection to ground, loops that cannot be closed or leave nothing to move,
-/// joints that move no mass, force elements without direction, loads that depend on accelerations, start values that
-/// nothing determines.
+/// All mechanical faults found: bodies without connection to ground, loops that cannot be closed or leave nothing to
+/// move, joints that move no mass, force elements without direction, loads that depend on accelerations, start values
+/// that nothing determines.
 pub fn derive(study: &Study) -> Result<System, Vec<Diagnostic>> {
     let mut graph = study.graph.clone();
     refuse_large_modes(&mut graph, study)?;

@@ -1,14 +1,15 @@
-//! Elastic bodies in the tree, by the floating frame of reference (Shabana-2013, chapter 5; Schwertassek-Wallrapp-1999).
+//! Elastic bodies in the tree, by the floating frame of reference (Shabana-2013, chapter 5;
+//! Schwertassek-Wallrapp-1999).
 //!
-//! The modal coordinates of a body are links without motion of their own between the joint that carries the body and the body.
-//! A frame of the body that deformation moves is a chain of links behind it, single shifts and turns whose coordinates are
-//! weighted sums of the modal ones. Where the joint itself stands on such a frame, the shapes are first reduced by the rigid
-//! motion of that frame, so that the modes are seen from the joint.
+//! The modal coordinates of a body are links without motion of their own between the joint that carries the body and
+//! the body. A frame of the body that deformation moves is a chain of links behind it, single shifts and turns whose
+//! coordinates are weighted sums of the modal ones. Where the joint itself stands on such a frame, the shapes are first
+//! reduced by the rigid motion of that frame, so that the modes are seen from the joint.
 //!
-//! Kept are the inertia coupling between modes and rigid motion at the undeformed shape, with the gyroscopic terms that follow
-//! from the kinetic energy, and the moment of the weight about the deformed centre of gravity. Neglected is what deformation
-//! changes in the inertia itself (terms of first order in the kinetic energy: centrifugal softening, and with it geometric
-//! stiffening).
+//! Kept are the inertia coupling between modes and rigid motion at the undeformed shape, with the gyroscopic terms that
+//! follow from the kinetic energy, and the moment of the weight about the deformed centre of gravity. Neglected is what
+//! deformation changes in the inertia itself (terms of first order in the kinetic energy: centrifugal softening, and
+//! with it geometric stiffening).
 
 use super::articulated::{Inertia, Wrench, body_inertia};
 use super::kinematics::FrameMotion;
@@ -37,7 +38,8 @@ pub(super) struct ElasticSeats {
     pub frames: Vec<Option<Seat>>,
 }
 
-/// Adds the links of an elastic body to the tree. `base` is its undeformed seat on the joint that carries it at its frame
+/// Adds the links of an elastic body to the tree. `base` is its undeformed seat on the joint that carries it at its
+/// frame
 /// `carried_at`; `used` says which of its frames are needed.
 pub(super) fn attach(
     graph: &mut Graph,
@@ -281,7 +283,8 @@ impl Modal {
 /// Shares of mass and inertia that modes may exceed by rounding in their file.
 const ROUNDING: f64 = 1e-4;
 
-/// Modes of modal mass 1 kg take along no more than there is: the body's inertia less what its modes carry is not negative.
+/// Modes of modal mass 1 kg take along no more than there is: the body's inertia less what its modes carry is not
+/// negative.
 ///
 /// # Errors
 /// One per body whose modes are scaled otherwise.

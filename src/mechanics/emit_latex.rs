@@ -7,7 +7,8 @@ use std::fmt::Write;
 
 /// Rates of the states, constraints and measures as an `align*` environment (package amsmath).
 ///
-/// Coordinates are `q`, their rates `\\dot q`, both with the joint's name as index; common subexpressions are `e_1`, `e_2`, ...
+/// Coordinates are `q`, their rates `\\dot q`, both with the joint's name as index; common subexpressions are `e_1`,
+/// `e_2`, ...
 pub fn emit_latex(study: &Study, system: &System) -> String {
     let inputs: Vec<String> = study.inputs.iter().map(|input| input.name.clone()).collect();
     let mut roots: Vec<Node> = system.rates.iter().chain(&system.constraints).copied().collect();

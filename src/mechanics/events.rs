@@ -1,8 +1,9 @@
 //! What events do to the states: new values of law states, and impulses along force elements.
 //!
-//! An impulse `L` along an element changes all velocities by `da/dload L`, the accelerations being linear in loads; `L` is such that
-//! the element's rate becomes the value asked for (Pfeiffer-Glocker-1996, Poisson and Newton impacts without friction). Joints
-//! that close loops answer with impulses of their own, such that the rates of their constraints stay as they are.
+//! An impulse `L` along an element changes all velocities by `da/dload L`, the accelerations being linear in loads; `L`
+//! is such that the element's rate becomes the value asked for (Pfeiffer-Glocker-1996, Poisson and Newton impacts
+//! without friction). Joints that close loops answer with impulses of their own, such that the rates of their
+//! constraints stay as they are.
 
 use super::articulated::Accelerated;
 use super::forces::ForceGeometry;
@@ -90,9 +91,9 @@ struct After {
 
 /// All velocities after an impulse that brings `rate` to `value`.
 ///
-/// With the rates `J v` of the element and of the constraints, the impulses `L` along them change the velocities by `M^-1 J^T L`; the
-/// matrix `J M^-1 J^T` is positive definite where the constraints leave the element's rate free, so that elimination needs no
-/// exchange of rows.
+/// With the rates `J v` of the element and of the constraints, the impulses `L` along them change the velocities by
+/// `M^-1 J^T L`; the matrix `J M^-1 J^T` is positive definite where the constraints leave the element's rate free, so
+/// that elimination needs no exchange of rows.
 fn velocities_after(
     graph: &mut Graph,
     tree: &Tree,

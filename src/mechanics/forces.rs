@@ -131,9 +131,9 @@ fn turning_axis(
     (vector::apply(graph, orientation, axis), seat.link)
 }
 
-/// Angle of the second body against the first about an axis: the sum of the turns between them where all are about it, however
-/// far; else that between the projections of a direction that is perpendicular to the axis and parallel in both bodies in the
-/// reference configuration, up to half a turn.
+/// Angle of the second body against the first about an axis: the sum of the turns between them where all are about it,
+/// however far; else that between the projections of a direction that is perpendicular to the axis and parallel in both
+/// bodies in the reference configuration, up to half a turn.
 fn about_axis(
     graph: &mut Graph,
     tree: &Tree,
@@ -184,7 +184,8 @@ fn angle_between(graph: &mut Graph, [from, to]: [[Node; 2]; 2]) -> Node {
     graph.binary(Binary::Atan2, across, along)
 }
 
-/// The sum of the coordinates by which a frame has turned about a constant axis; `None` where something turns it otherwise.
+/// The sum of the coordinates by which a frame has turned about a constant axis; `None` where something turns it
+/// otherwise.
 fn turns_about(graph: &mut Graph, tree: &Tree, mut link: Option<usize>, axis: Vector) -> Option<Node> {
     let mut sum = graph.constant(0.0);
     while let Some(at) = link {

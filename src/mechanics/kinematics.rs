@@ -25,8 +25,8 @@ pub(super) struct FrameMotion {
     pub bias: Vector,
 }
 
-/// Spatial velocity or acceleration of a frame: angular, and linear at the frame's origin. The linear acceleration is the
-/// derivative of the velocity's components, without w x v.
+/// Spatial velocity or acceleration of a frame: angular, and linear at the frame's origin. The linear acceleration is
+/// the derivative of the velocity's components, without w x v.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SpatialMotion {
     pub angular: Vector,
@@ -73,8 +73,8 @@ fn turned_by(graph: &mut Graph, quaternion: [Symbol; 4], axes: Matrix) -> Matrix
     vector::multiply(graph, rotation, vector::transpose(axes))
 }
 
-/// The relative velocity (angular, linear) with which the bias of a link arises: its own, but for a free rotation, whose
-/// three components turn with the frame together, the first takes all and the others nothing.
+/// The relative velocity (angular, linear) with which the bias of a link arises: its own, but for a free rotation,
+/// whose three components turn with the frame together, the first takes all and the others nothing.
 fn rate_in_bias(graph: &mut Graph, link: &Link) -> (Vector, Vector) {
     let zero = vector::zero(graph);
     match link.coordinate {

@@ -15,10 +15,11 @@ const LARGEST_STEP: f64 = 0.3;
 const MOST_STEPS: usize = 100;
 /// Steps without a smaller error than the best before them: a dead end.
 const PATIENCE: usize = 25;
-/// How far the configuration judged is from the start (m and rad): symmetric positions have constraints that depend on each
-/// other only there.
+/// How far the configuration judged is from the start (m and rad): symmetric positions have constraints that depend on
+/// each other only there.
 const ASIDE: f64 = 0.03;
-/// Other positions tried where the start leads nowhere, and how far away they are (rad; m relative to the largest error).
+/// Other positions tried where the start leads nowhere, and how far away they are (rad; m relative to the largest
+/// error).
 const ATTEMPTS: usize = 40;
 const FAR: f64 = 3.0;
 
@@ -152,9 +153,9 @@ impl Linkage {
         given
     }
 
-    /// Positions at which the loops are closed: near those given, which stay where that is possible; else from elsewhere.
-    /// The residual near the start otherwise.
-    /// Where they state more than the loops leave free, the first of them in `order` are kept.
+    /// Positions at which the loops are closed: near those given, which stay where that is possible; else from
+    /// elsewhere. The residual near the start otherwise. Where they state more than the loops leave free, the first of
+    /// them in `order` are kept.
     pub fn assembled(
         &mut self,
         given: &HashMap<Symbol, f64>,
@@ -191,7 +192,8 @@ impl Linkage {
         outcome.map(|()| closed)
     }
 
-    /// Of several ways to close the loops, the present one first, that in which the stated coordinates are nearest to what is stated.
+    /// Of several ways to close the loops, the present one first, that in which the stated coordinates are nearest to
+    /// what is stated.
     fn nearest_stated(
         &mut self,
         start: &HashMap<Symbol, f64>,
@@ -217,8 +219,8 @@ impl Linkage {
         best
     }
 
-    /// Closes the loops from one position by the first of these sets of coordinates that can, each beginning where the one before came
-    /// nearest: what is stated too much says the way first. The residual of the last one otherwise.
+    /// Closes the loops from one position by the first of these sets of coordinates that can, each beginning where the
+    /// one before came nearest: what is stated too much says the way first. The residual of the last one otherwise.
     fn close_by(&mut self, from: &HashMap<Symbol, f64>, sets: &[Vec<usize>]) -> Result<(), Vec<f64>> {
         let mut outcome = Err(Vec::new());
         self.values = from.clone();
@@ -235,7 +237,8 @@ impl Linkage {
         outcome
     }
 
-    /// A closed position near another that is not special, and the Jacobian of the constraints there: m x n, column-major.
+    /// A closed position near another that is not special, and the Jacobian of the constraints there: m x n,
+    /// column-major.
     pub fn general_position(&mut self, closed: &HashMap<Symbol, f64>) -> (HashMap<Symbol, f64>, Vec<f64>) {
         let drawn = std::mem::replace(&mut self.values, closed.clone());
         self.move_aside();
@@ -485,8 +488,8 @@ impl Linkage {
         self.advance(moved, &step);
     }
 
-    /// Newton's method with the shortest steps (Gauss-Newton) of the coordinates `moved`. The residual where it got stuck, or
-    /// ends in a joint that is turned over.
+    /// Newton's method with the shortest steps (Gauss-Newton) of the coordinates `moved`. The residual where it got
+    /// stuck, or ends in a joint that is turned over.
     fn close(&mut self, moved: &[usize]) -> Result<(), Vec<f64>> {
         let largest = |values: &[f64]| {
             values.iter().fold(0.0_f64, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(v.abs()) })

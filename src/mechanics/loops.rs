@@ -1,7 +1,7 @@
 //! Joints that close kinematic loops, as constraints on position and velocity level.
 //!
-//! A row is the dot product of two vectors that move with the bodies; its rate is a linear function of the velocities, and
-//! a multiplier acts on the bodies by exactly the transpose of that function.
+//! A row is the dot product of two vectors that move with the bodies; its rate is a linear function of the velocities,
+//! and a multiplier acts on the bodies by exactly the transpose of that function.
 
 use super::articulated::{Loads, Wrench};
 use super::chain::{Chain, Ends, FreeShift, unit};
@@ -434,8 +434,8 @@ impl Held {
         }
     }
 
-    /// What multiplier 1 does: force and moment on the far body at its end (ground axes), and the moment on the near one at
-    /// its own, where the opposite force acts.
+    /// What multiplier 1 does: force and moment on the far body at its end (ground axes), and the moment on the near
+    /// one at its own, where the opposite force acts.
     fn load(&self, graph: &mut Graph, frames: &[FrameMotion]) -> (Vector, [Vector; 2]) {
         let zero = vector::zero(graph);
         let [[u, w], _] = self.directions(graph, frames);

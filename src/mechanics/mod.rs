@@ -1,13 +1,16 @@
 //! From a checked study to equations of motion.
 //!
-//! *In*: a [`crate::study::Study`]. *Out*: a [`System`] of expressions in time, states, parameters and input samples only.
+//! *In*: a [`crate::study::Study`]. *Out*: a [`System`] of expressions in time, states, parameters and input samples
+//! only.
 //! *Must not happen here*: repeated numerical evaluation, parsing, knowledge of particular laws.
 //!
 //! A joint is a list of motion axes; every axis is one link of the spanning tree (`topology`). Motion goes outwards
 //! (`kinematics`), forces come from the elements (`forces`), accelerations from the articulated-body algorithm
-//! (`articulated`, with modes of elastic bodies `elastic` and `modal_pass`), all on symbolic scalars, so that whatever is structurally zero vanishes. Joints that close loops are rows of
-//! constraints (`loops`), so are relations of positions (`couplings`), of which those count that are independent near the start (`assembly`, in numbers `linkage`; where a loop needs others in other positions, `selection`), with two multipliers each
-//! (`multipliers`); what joints transmit follows from the same pass (`reactions`).
+//! (`articulated`, with modes of elastic bodies `elastic` and `modal_pass`), all on symbolic scalars, so that whatever
+//! is structurally zero vanishes. Joints that close loops are rows of constraints (`loops`), so are relations of
+//! positions (`couplings`), of which those count that are independent near the start (`assembly`, in numbers `linkage`;
+//! where a loop needs others in other positions, `selection`), with two multipliers each (`multipliers`); what joints
+//! transmit follows from the same pass (`reactions`).
 
 mod articulated;
 mod assemble;

@@ -13,8 +13,8 @@ use crate::expression::{Graph, Node, Symbol};
 use crate::study::{ForcePlace, ReactionQuantity, Study};
 use std::collections::HashMap;
 
-/// Meaning of what joints transmit. Where loads depend on it (friction by a normal force) it becomes an unknown of its own:
-/// returned with its definition.
+/// Meaning of what joints transmit. Where loads depend on it (friction by a normal force) it becomes an unknown of its
+/// own: returned with its definition.
 pub(super) fn add_reactions(
     graph: &mut Graph,
     study: &Study,

@@ -1,8 +1,8 @@
 //! Which constraints count where.
 //!
-//! A loop that holds more than it needs (Bennett's and Bricard's linkages) has constraints that are independent of each other in
-//! some positions and not in others, although as many as ever are independent everywhere. Then several sets of them take turns: all hold
-//! the same, so that changing over moves nothing, and only the multipliers are others.
+//! A loop that holds more than it needs (Bennett's and Bricard's linkages) has constraints that are independent of each
+//! other in some positions and not in others, although as many as ever are independent everywhere. Then several sets of
+//! them take turns: all hold the same, so that changing over moves nothing, and only the multipliers are others.
 
 use crate::expression::{Binary, Graph, Node, Symbol};
 
@@ -17,8 +17,8 @@ const MOST_ROWS: usize = 10;
 /// Rows that are connected by coordinates, and the sets of them that take turns.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
-    /// Every set has as many rows as the others; a row stands at the same place in all sets it belongs to. The first is the best at a
-    /// general position.
+    /// Every set has as many rows as the others; a row stands at the same place in all sets it belongs to. The first is
+    /// the best at a general position.
     pub sets: Vec<Vec<usize>>,
     /// Per start of the study the best set there.
     pub at_starts: Vec<usize>,
@@ -38,8 +38,8 @@ impl Jacobian<'_> {
     }
 }
 
-/// Groups with more than one set. `kept` are the rows independent at a general position, `along` the Jacobians in positions that the
-/// mechanism can reach, `starts` those at the starts.
+/// Groups with more than one set. `kept` are the rows independent at a general position, `along` the Jacobians in
+/// positions that the mechanism can reach, `starts` those at the starts.
 pub(super) fn groups(kept: &[usize], along: &[Jacobian], starts: &[Jacobian]) -> Vec<Group> {
     let Some(first) = along.first() else { return vec![] };
     let sizes: Vec<f64> = (0..first.rows)
@@ -266,8 +266,8 @@ mod tests {
         }
     }
 
-    /// Three rows of two unknowns, of which the first vanishes in a position where the second, else parallel to it, does not; the third
-    /// row shares an unknown with them or is a component of its own, of which no row can be spared.
+    /// Three rows of two unknowns, of which the first vanishes in a position where the second, else parallel to it,
+    /// does not; the third row shares an unknown with them or is a component of its own, of which no row can be spared.
     #[test]
     fn a_row_that_vanishes_is_replaced() {
         fn jacobian(values: &[f64]) -> Jacobian<'_> {

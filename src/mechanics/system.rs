@@ -6,12 +6,12 @@ use crate::quantities::Dimension;
 use crate::study::EventTrigger;
 use std::collections::HashMap;
 
-/// Name of the probe of an elastic body, behind that of the body: squared ratio of its angular velocity and its lowest circular
-/// frequency.
+/// Name of the probe of an elastic body, behind that of the body: squared ratio of its angular velocity and its lowest
+/// circular frequency.
 pub const TURNING: &str = "turning";
 
-/// Name of the state that says which constraints of a loop are in force where several sets of them take turns, behind that of their
-/// joint.
+/// Name of the state that says which constraints of a loop are in force where several sets of them take turns, behind
+/// that of their joint.
 pub const IN_FORCE: &str = "constraints_in_force";
 
 /// `x' = rates(t, x, w, theta)`, `0 = constraints(t, x, w, theta)`, `y = outputs(t, x, w, theta)`.
@@ -26,8 +26,8 @@ pub struct System {
     pub time: Symbol,
     pub states: Vec<Variable>,
     pub rates: Vec<Node>,
-    /// Multipliers of closed loops on velocity level, those on position level (Gear-Gupta-Leimkuhler), then reactions that
-    /// loads depend on.
+    /// Multipliers of closed loops on velocity level, those on position level (Gear-Gupta-Leimkuhler), then reactions
+    /// that loads depend on.
     pub algebraic: Vec<Variable>,
     /// One per algebraic variable: velocity constraints, position constraints, definitions of the reactions.
     pub constraints: Vec<Node>,
@@ -48,7 +48,8 @@ pub struct System {
     /// Further quantities that can be evaluated along a solution: place probes in the study's order of
     /// `places[..].probes[..]`, flattened; then per elastic body [`TURNING`].
     pub probes: Vec<Output>,
-    /// Per experiment, then per manoeuvre: start value of each state as far as given (see [`StartEquation`]), in state order.
+    /// Per experiment, then per manoeuvre: start value of each state as far as given (see [`StartEquation`]), in state
+    /// order.
     pub starts: Vec<Vec<StartEquation>>,
     /// Likewise a position near the start in which the loops are closed, SI.
     pub references: Vec<Vec<f64>>,
@@ -63,8 +64,8 @@ pub struct Variable {
     pub dimension: Dimension,
     /// Typical magnitude, SI; the integrator's absolute tolerance refers to it.
     pub scale: f64,
-    /// Value in the reference configuration: zero, but for the first component of quaternions; with closed loops, in a position
-    /// near it (near the first start of the study) that closes them.
+    /// Value in the reference configuration: zero, but for the first component of quaternions; with closed loops, in a
+    /// position near it (near the first start of the study) that closes them.
     pub reference: f64,
 }
 

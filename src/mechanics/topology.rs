@@ -7,9 +7,9 @@ use crate::expression::{Graph, Node, Symbol};
 use crate::study::{Attachment, AxisMotion, ForcePlace, Joint, JointSymbols, RotationSymbols, Study};
 use std::collections::VecDeque;
 
-/// One single motion: a frame that shifts along or turns about a constant axis relative to its predecessor. A joint with
-/// several freedoms becomes a chain of links, all but the last without bodies. All links are parallel to the ground in the
-/// reference configuration.
+/// One single motion: a frame that shifts along or turns about a constant axis relative to its predecessor. A joint
+/// with several freedoms becomes a chain of links, all but the last without bodies. All links are parallel to the
+/// ground in the reference configuration.
 #[derive(Clone, Debug)]
 pub(super) struct Link {
     /// `None`: ground.
@@ -37,9 +37,9 @@ pub(super) enum Coordinate {
     Free { symbols: JointSymbols, at: usize },
     /// Position, velocity, acceleration are given.
     Prescribed { symbols: JointSymbols, at: usize, motion: [Node; 3] },
-    /// One of the three components of a free rotation, along the axes (columns of `axes`) of the joint's child. Walked from
-    /// parent to child they are fixed in the frame, and the first carries the whole rotation; walked from child to parent they
-    /// are fixed in the predecessor, and the rotation follows behind the last.
+    /// One of the three components of a free rotation, along the axes (columns of `axes`) of the joint's child. Walked
+    /// from parent to child they are fixed in the frame, and the first carries the whole rotation; walked from child to
+    /// parent they are fixed in the predecessor, and the rotation follows behind the last.
     Rotation { symbols: RotationSymbols, component: usize, axes: Matrix, is_reversed: bool },
     /// The turned frame behind the components of a reversed free rotation; no motion of its own.
     Turned { symbols: RotationSymbols, axes: Matrix },
@@ -300,7 +300,8 @@ fn rotations(graph: &mut Graph, joint: &Joint, is_reversed: bool, inner: Matrix)
     if is_reversed { (outer, outer) } else { (inner, outer) }
 }
 
-/// The motions of a joint, one after the other. Walked from child to parent they are the opposite ones in opposite order.
+/// The motions of a joint, one after the other. Walked from child to parent they are the opposite ones in opposite
+/// order.
 fn motions(
     graph: &mut Graph,
     study: &Study,

@@ -1,5 +1,5 @@
-//! Stand-alone SVG files: the one picture of a diagnosis (histories before and after, and the missing force), courses of
-//! optimisers, cuts of the cost.
+//! Stand-alone SVG files: the one picture of a diagnosis (histories before and after, and the missing force), courses
+//! of optimisers, cuts of the cost.
 
 use crate::diagnose::{Answer, MissingForce};
 use crate::identify::{ChannelFit, RecordFit};
@@ -44,7 +44,8 @@ pub(super) fn framed(width: f64, height: f64, title: &str, content: &str) -> Str
     )
 }
 
-/// Measured against simulated (before and after) and residuals on the left, the missing force over velocity on the right.
+/// Measured against simulated (before and after) and residuals on the left, the missing force over velocity on the
+/// right.
 ///
 /// The record shown is a held-out one where there is one; of its channels the one whose discrepancy falls most.
 pub fn summary(answer: &Answer) -> String {

@@ -110,8 +110,8 @@ fn spline(values: &[f64], step: f64) -> Vec<[f64; 4]> {
         .collect()
 }
 
-/// Second derivatives m at the knots: m_{k-1} + 4 m_k + m_{k+1} = 6 (y_{k-1} - 2 y_k + y_{k+1}) / step^2 inside; the third
-/// derivative is continuous at the second and the last but one knot: m_0 = 2 m_1 - m_2 and likewise at the end.
+/// Second derivatives m at the knots: m_{k-1} + 4 m_k + m_{k+1} = 6 (y_{k-1} - 2 y_k + y_{k+1}) / step^2 inside; the
+/// third derivative is continuous at the second and the last but one knot: m_0 = 2 m_1 - m_2 and likewise at the end.
 fn curvatures(values: &[f64], step: f64) -> Vec<f64> {
     let count = values.len();
     let inner = count - 2;

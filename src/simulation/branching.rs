@@ -19,7 +19,8 @@ pub struct Branching {
 const INSTANTS: usize = 1000;
 /// Mechanisms of more freedoms before their loops are closed are not watched.
 const MOST_FREEDOMS: usize = 40;
-/// The directions left free at one instant must be found again in the next to this share, else both have nothing in common.
+/// The directions left free at one instant must be found again in the next to this share, else both have nothing in
+/// common.
 const FOUND_AGAIN: f64 = 0.5;
 /// Smallest singular value over its largest in the run: at a singular position, and near one.
 const SINGULAR: f64 = 1e-6;
@@ -38,9 +39,9 @@ struct Instant {
     continues: bool,
 }
 
-/// Passages along a solution, rows `y` at `times`: the constraints with the directions that they leave free are as many as there are
-/// coordinates, and their determinant changes its sign where the constraints become dependent (the test for simple branch points of
-/// continuation methods).
+/// Passages along a solution, rows `y` at `times`: the constraints with the directions that they leave free are as many
+/// as there are coordinates, and their determinant changes its sign where the constraints become dependent (the test
+/// for simple branch points of continuation methods).
 pub(super) fn branchings(compiled: &Compiled, bound: &mut Bound, times: &[f64], y: &[f64]) -> Vec<Branching> {
     let constraints = compiled.system.loop_constraints;
     let kinds = compiled.model.variables().iter().map(|variable| variable.kind);
@@ -148,8 +149,8 @@ struct Directions {
     continue_others: bool,
 }
 
-/// The directions that the constraints leave free, continued from those before, if there are any and they can be. None where the
-/// constraints depend on each other.
+/// The directions that the constraints leave free, continued from those before, if there are any and they can be. None
+/// where the constraints depend on each other.
 fn directions(jacobian: &[f64], rows: usize, before: &[Vec<f64>]) -> Option<Directions> {
     let n = jacobian.len() / rows;
     let mut basis: Vec<Vec<f64>> = Vec::new();
@@ -189,7 +190,8 @@ fn across(others: &[Vec<f64>], vector: &[f64], least: f64) -> Option<Vec<f64>> {
     (length > least).then_some(rest)
 }
 
-/// Of the square matrix with the constraints as its first rows and the directions as the others; by elimination with pivots.
+/// Of the square matrix with the constraints as its first rows and the directions as the others; by elimination with
+/// pivots.
 fn sign_of_determinant(jacobian: &[f64], rows: usize, directions: &[Vec<f64>]) -> f64 {
     let of_row = |row: usize| jacobian.iter().skip(row).step_by(rows).copied().collect::<Vec<f64>>();
     let mut matrix: Vec<Vec<f64>> = (0..rows).map(of_row).chain(directions.iter().cloned()).collect();

@@ -7,8 +7,8 @@ use crate::mechanics::{TURNING, VariableKind};
 use crate::quantities::Dimension;
 use crate::study::Body;
 
-/// Angular velocity over the lowest circular frequency from which on it is told: centrifugal forces, which go with its square,
-/// then change the stiffness by some percent.
+/// Angular velocity over the lowest circular frequency from which on it is told: centrifugal forces, which go with its
+/// square, then change the stiffness by some percent.
 const FAST: f64 = 0.2;
 
 /// Whether there may be cautions at all: for elastic bodies and closed loops.
@@ -16,8 +16,8 @@ pub fn needs_caution(compiled: &Compiled) -> bool {
     compiled.system.loop_constraints > 0 || compiled.study.bodies.iter().any(|body| body.elastic.is_some())
 }
 
-/// Warnings about this record with the parameters `theta` (SI). A record that cannot be simulated has none: that it fails is told
-/// elsewhere.
+/// Warnings about this record with the parameters `theta` (SI). A record that cannot be simulated has none: that it
+/// fails is told elsewhere.
 pub fn cautions(compiled: &Compiled, record: &Record, theta: &[f64]) -> Vec<Diagnostic> {
     if !needs_caution(compiled) {
         return Vec::new();
@@ -53,8 +53,8 @@ fn fast_turning(compiled: &Compiled, record: &Record, trajectory: &Trajectory, b
     Some(diagnostic)
 }
 
-/// Stated positions that say which way a mechanism stands are moved by less than this share and so many typical magnitudes; stated
-/// velocities are meant.
+/// Stated positions that say which way a mechanism stands are moved by less than this share and so many typical
+/// magnitudes; stated velocities are meant.
 const ROUGHLY: (f64, f64) = (0.2, 2.0);
 const EXACTLY: (f64, f64) = (0.01, 0.1);
 

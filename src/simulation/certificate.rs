@@ -1,9 +1,10 @@
 //! How exact the gradient is: that of a run against an independent derivative along the same steps.
 //!
 //! Along a recorded sequence of steps the solution is a function of the parameters, whose exact derivative the gradient
-//! claims to be. Models are differentiated anew by dual numbers, the variation integrated as part of the state; those with
-//! clocks, and loops where dual numbers cannot start, by central differences of sixth order. Neither shares code with the gradient beyond the model itself:
-//! sensitivity equations, symbolic derivatives of the model, of the start and of the measures are left out.
+//! claims to be. Models are differentiated anew by dual numbers, the variation integrated as part of the state; those
+//! with clocks, and loops where dual numbers cannot start, by central differences of sixth order. Neither shares code
+//! with the gradient beyond the model itself: sensitivity equations, symbolic derivatives of the model, of the start
+//! and of the measures are left out.
 
 use super::failure::Failure;
 use super::prepare::Record;
@@ -17,7 +18,8 @@ use std::sync::Arc;
 /// Random directions tried.
 const DIRECTIONS: usize = 2;
 /// Distances of the differences as shares of the parameters' typical variation, tried until the digits suffice; what
-/// fits best counts. A far distance serves smooth models; laws with a sharp bend need a near one, where rounding limits.
+/// fits best counts. A far distance serves smooth models; laws with a sharp bend need a near one, where rounding
+/// limits.
 const DISTANCES: [f64; 6] = [3e-4, 1e-3, 3e-5, 1e-6, 1e-7, 1e-8];
 const SUFFICIENT: f64 = 9.0;
 /// Tolerance of whole runs that are differenced.
@@ -27,9 +29,10 @@ const WEIGHTS: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
 /// An influence below this share of a channel's own size is not judged by itself.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// Digits to which the gradient of `records` at `theta` agrees with an independent derivative along the same steps, in random
-/// directions: the worst of all records, channels and directions. Where events move with the parameters no steps can be held:
-/// there differences of whole runs at a tight tolerance tell, to fewer digits. None where there is no parameter.
+/// Digits to which the gradient of `records` at `theta` agrees with an independent derivative along the same steps, in
+/// random directions: the worst of all records, channels and directions. Where events move with the parameters no steps
+/// can be held: there differences of whole runs at a tight tolerance tell, to fewer digits. None where there is no
+/// parameter.
 ///
 /// # Errors
 /// [`Failure`] of the run itself.

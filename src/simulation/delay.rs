@@ -1,7 +1,7 @@
 //! Measured channels that arrive late: at which instants the solution is needed, and how the delays enter the gradient.
 //!
-//! A channel with delay tau shows at the sample time t what the model did at t - tau, exactly, by the solution's interpolant;
-//! what lies before the start is the value at the start.
+//! A channel with delay tau shows at the sample time t what the model did at t - tau, exactly, by the solution's
+//! interpolant; what lies before the start is the value at the start.
 
 use super::prepare::Record;
 use crate::expression::{Graph, Node, Symbol};
@@ -130,8 +130,8 @@ impl Schedule {
         }
     }
 
-    /// Derivative of sample `k` of a channel by the parameters through its delay; `value`: of the channel at a row. `None`
-    /// where there is nothing to add.
+    /// Derivative of sample `k` of a channel by the parameters through its delay; `value`: of the channel at a row.
+    /// `None` where there is nothing to add.
     pub fn slopes(&self, channel: usize, k: usize, mut value: impl FnMut(usize) -> f64) -> Option<Vec<f64>> {
         let late = self.channels[channel].as_ref().filter(|late| late.slopes.iter().any(|slope| *slope != 0.0))?;
         let [a, b, c, d] = late.around[k]?.map(&mut value);

@@ -8,8 +8,8 @@ use crate::tape::InputSource;
 #[derive(Clone, Debug)]
 pub struct RecordInputs {
     pub(super) channels: Vec<Channel>,
-    /// Index of the experiment (beyond the experiments: of a manoeuvre), which the study samples like an input behind its last
-    /// one where quantities differ between experiments.
+    /// Index of the experiment (beyond the experiments: of a manoeuvre), which the study samples like an input behind
+    /// its last one where quantities differ between experiments.
     pub(super) experiment: usize,
 }
 

@@ -7,8 +7,8 @@ use crate::study::{ForcePlace, Study};
 /// At most so many elements are listed by name.
 const NAMED: usize = 6;
 
-/// `name` of equation `i` with what acts in it: for the rate of a joint's velocity the forces between the bodies that the joint
-/// carries and all others.
+/// `name` of equation `i` with what acts in it: for the rate of a joint's velocity the forces between the bodies that
+/// the joint carries and all others.
 pub(super) fn with_elements(compiled: &Compiled, i: usize, name: String) -> String {
     let Some(variable) = compiled.model.variables().get(i).filter(|_| i < compiled.model.state_count()) else {
         return name;

@@ -35,7 +35,8 @@ impl Compiled {
         if idle.is_empty() { Ok(Self { study, system, model, delays }) } else { Err(idle) }
     }
 
-    /// As [`Compiled::new`], with the named parameters held at these values (SI): they become constants of the equations.
+    /// As [`Compiled::new`], with the named parameters held at these values (SI): they become constants of the
+    /// equations.
     ///
     /// # Errors
     /// As [`Compiled::new`].
@@ -242,8 +243,8 @@ pub(super) fn start(
         if failure.cause != FailureCause::InconsistentStart {
             return Err(failure);
         }
-        // More positions of a loop are stated than it has freedoms: the first ones are kept, the others say where it stands, not to
-        // the last digit. Then the same of velocities.
+        // More positions of a loop are stated than it has freedoms: the first ones are kept, the others say where it
+        // stands, not to the last digit. Then the same of velocities.
         let [positions, velocities] = [VariableKind::Position, VariableKind::Velocity].map(|kind| {
             let order = stated_order(compiled, record.experiment);
             order.into_iter().filter(|&i| compiled.model.variables()[i].kind == kind).collect::<Vec<usize>>()

@@ -5,10 +5,12 @@ use crate::expression::{Graph, vector};
 use crate::linear::SingularValueDecomposition;
 use crate::study::{AxisMotion, Joint};
 
-/// Smallest over largest singular value of a joint's motions (angular velocity, velocity in 1 m) from which on two of them count as one.
+/// Smallest over largest singular value of a joint's motions (angular velocity, velocity in 1 m) from which on two of
+/// them count as one.
 const DEPENDENT: f64 = 0.02;
 
-/// What to say of a joint whose motions fall together in this state, with the coordinate `blamed` (index of the variable) among them.
+/// What to say of a joint whose motions fall together in this state, with the coordinate `blamed` (index of the
+/// variable) among them.
 pub(super) fn singular_joint(compiled: &Compiled, y: &[f64], blamed: Option<usize>) -> Option<String> {
     let variables = compiled.model.variables();
     let blamed = variables.get(blamed?)?.symbol;

@@ -8,8 +8,8 @@ use crate::mechanics::Variable;
 use crate::study::Parameter;
 use crate::tape::Bound;
 
-/// State at one sample of a record: y (length n) and its derivatives by all p parameters, n x p column-major (empty where
-/// they were not asked for).
+/// State at one sample of a record: y (length n) and its derivatives by all p parameters, n x p column-major (empty
+/// where they were not asked for).
 #[derive(Clone, Debug, Default)]
 pub struct State {
     pub y: Vec<f64>,

@@ -1,5 +1,5 @@
-//! The derivative of a run in one direction of the parameters by dual numbers: a model and its variation as one system of
-//! twice the size, along a recorded sequence of steps.
+//! The derivative of a run in one direction of the parameters by dual numbers: a model and its variation as one system
+//! of twice the size, along a recorded sequence of steps.
 
 use super::delay::Schedule;
 use super::failure::Failure;
@@ -91,8 +91,8 @@ fn doubled_start(
     Ok(Start { time: nominal.time, y_prime: vec![0.0; y.len()], y, sensitivity: Vec::new() })
 }
 
-/// `y' = f(t, y, w)`, `0 = g(t, y, w)` and their derivatives along the direction: those of the rates and constraints by dual
-/// numbers.
+/// `y' = f(t, y, w)`, `0 = g(t, y, w)` and their derivatives along the direction: those of the rates and constraints by
+/// dual numbers.
 struct Doubled<'b, 'm> {
     bound: &'b mut Bound<'m>,
     variation: Tangent,

@@ -26,8 +26,8 @@ impl ErrorChange {
 }
 
 /// Percentile interval of the relative change of the summed squared residuals (Kunsch-1989): blocks of
-/// `block_length` successive samples are drawn with replacement within each record, the same for both models and for all
-/// channels. Deterministic: the same seed gives the same digits on every machine.
+/// `block_length` successive samples are drawn with replacement within each record, the same for both models and for
+/// all channels. Deterministic: the same seed gives the same digits on every machine.
 ///
 /// `records`: per record the squared residuals of (base, extended), summed over weighted channels, per sample. `None`
 /// without samples, or where the base model has no error at all.

@@ -33,8 +33,8 @@ impl Information {
         Self { theta: theta.to_vec(), matrix: gram.iter().map(|value| value / noise_variance).collect() }
     }
 
-    /// From a covariance as another study wrote it: finite part (p x p) and undetermined directions (each of length p, in
-    /// scaled parameters). `scale` as in that result.
+    /// From a covariance as another study wrote it: finite part (p x p) and undetermined directions (each of length p,
+    /// in scaled parameters). `scale` as in that result.
     pub fn from_covariance(
         theta: &[f64],
         covariance: &[f64],
@@ -51,8 +51,8 @@ impl Information {
     }
 }
 
-/// `C12^-1 = C1^-1 + C2^-1`, `theta12 = C12 (C1^-1 theta1 + C2^-1 theta2)`; in directions that neither determines the first
-/// result's parameters stay. `scale` (widths of the bounds) and `threshold` decide what is undetermined.
+/// `C12^-1 = C1^-1 + C2^-1`, `theta12 = C12 (C1^-1 theta1 + C2^-1 theta2)`; in directions that neither determines the
+/// first result's parameters stay. `scale` (widths of the bounds) and `threshold` decide what is undetermined.
 pub fn combine(
     first: &Information,
     second: &Information,

@@ -35,8 +35,8 @@ pub struct BlockComparison {
     pub p_value: f64,
 }
 
-/// Compares residuals of equal length (weighted, filtered; one slice of samples per channel) in `blocks` blocks of time.
-/// Blocks without any error in one of the two are left out of the mean. `None` for fewer than two blocks.
+/// Compares residuals of equal length (weighted, filtered; one slice of samples per channel) in `blocks` blocks of
+/// time. Blocks without any error in one of the two are left out of the mean. `None` for fewer than two blocks.
 pub fn compare_blocks(base: &[&[f64]], extended: &[&[f64]], blocks: usize) -> Option<BlockComparison> {
     let samples = base.iter().chain(extended).map(|channel| channel.len()).min()?;
     if blocks < 2 || samples < blocks {

@@ -23,8 +23,8 @@ impl Covariance {
     /// From the weighted gradient (N x p column-major, unscaled parameters; rows of priors included, which are rows
     /// of the gradient like any other).
     ///
-    /// `gamma`: Phi^T S^T S Cov(D) S^T S Phi, p x p, of the weighted noise (method 3.30); without it the weighted noise is
-    /// white with variance `noise_variance`, which makes Cov = variance * (Phi^T S^T S Phi)^+.
+    /// `gamma`: Phi^T S^T S Cov(D) S^T S Phi, p x p, of the weighted noise (method 3.30); without it the weighted noise
+    /// is white with variance `noise_variance`, which makes Cov = variance * (Phi^T S^T S Phi)^+.
     /// `scale`, `threshold` as for [`super::identifiability`].
     pub fn new(
         gradient: &[f64],
@@ -115,8 +115,8 @@ pub fn confidence_interval(value: f64, standard_deviation: f64, degrees_of_freed
 /// Gamma of filtered white noise: sum over blocks of w^2 alpha |F^T S Phi|^2.
 ///
 /// `gradient`: N x p, weighted and filtered, rows in `blocks` of (row count, variance of the weighted noise before the
-/// filter: weight^2 * noise variance). `transposed_filter` applies F^T to a column of a block; a zero-phase filter is its own
-/// transpose but for the ends. Rows after the last block (priors) count with variance one, unfiltered.
+/// filter: weight^2 * noise variance). `transposed_filter` applies F^T to a column of a block; a zero-phase filter is
+/// its own transpose but for the ends. Rows after the last block (priors) count with variance one, unfiltered.
 pub fn filtered_noise_gamma(
     gradient: &[f64],
     parameters: usize,

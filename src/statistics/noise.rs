@@ -24,8 +24,8 @@ pub fn noise_variance(sum_of_squares: f64, trace: f64) -> f64 {
     sum_of_squares / trace
 }
 
-/// Unbiased noise variances per channel (unweighted, before the filter), the share that the fitted parameters have taken
-/// included (method 4.5, for several channels at once).
+/// Unbiased noise variances per channel (unweighted, before the filter), the share that the fitted parameters have
+/// taken included (method 4.5, for several channels at once).
 ///
 /// With P the stacked gradient and X = P^T P, the residual of block i is F d_i - P_i X^+ sum_j P_j^T F d_j; its
 /// expected square is linear in the channels' variances, which solves for them. Returns one variance per channel number

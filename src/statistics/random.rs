@@ -32,8 +32,8 @@ impl NormalStream {
     }
 }
 
-/// A matrix square root L (size x size, column-major, `L L^T = matrix`) of a symmetric positive semidefinite matrix: its
-/// eigenvectors times the roots of the eigenvalues. `scale` (positive) makes rows comparable first.
+/// A matrix square root L (size x size, column-major, `L L^T = matrix`) of a symmetric positive semidefinite matrix:
+/// its eigenvectors times the roots of the eigenvalues. `scale` (positive) makes rows comparable first.
 ///
 /// # Errors
 /// When the matrix holds a number that is not finite.

@@ -13,8 +13,8 @@ pub fn chi_square_p(statistic: f64, degrees_of_freedom: usize) -> f64 {
     ChiSquared::new(degrees_of_freedom as f64).map_or(f64::NAN, |distribution| distribution.sf(statistic.max(0.0)))
 }
 
-/// p-value of a score or likelihood ratio whose `one_sided` of the `degrees_of_freedom` strengths are restricted to one sign
-/// (0 or 1 of them): half the mass lies one degree of freedom lower (Self-Liang-1987).
+/// p-value of a score or likelihood ratio whose `one_sided` of the `degrees_of_freedom` strengths are restricted to one
+/// sign (0 or 1 of them): half the mass lies one degree of freedom lower (Self-Liang-1987).
 pub fn mixture_p(statistic: f64, degrees_of_freedom: usize, one_sided: bool) -> f64 {
     let full = chi_square_p(statistic, degrees_of_freedom);
     if !one_sided || degrees_of_freedom == 0 {

@@ -122,8 +122,8 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// A function that is positive where the condition holds and negative where it does not; none where the condition is not made
-/// of comparisons, or does not change.
+/// A function that is positive where the condition holds and negative where it does not; none where the condition is
+/// not made of comparisons, or does not change.
 fn switching(graph: &mut Graph, condition: Node) -> Option<Node> {
     match graph.operation(condition) {
         Operation::Binary(Binary::Less, a, b) => Some(graph.subtract(b, a)),

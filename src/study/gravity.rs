@@ -41,8 +41,8 @@ impl<'a> Checker<'a> {
         COMPONENTS[axis]
     }
 
-    /// The components that the study says to be zero: where gravity has one the support is not level. Their typical magnitude is that
-    /// of gravity.
+    /// The components that the study says to be zero: where gravity has one the support is not level. Their typical
+    /// magnitude is that of gravity.
     pub fn gravity_places(&mut self) -> Vec<Place> {
         let Some(declared) = self.gravity else { return Vec::new() };
         let squares = declared.map(|component| self.graph.multiply(component.node, component.node));

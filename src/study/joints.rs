@@ -253,8 +253,8 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Child axes to parent axes in the reference configuration, where the joint states it: `orientation = (90 deg, 0 deg, 0
-    /// deg)` turns about x, then about the turned y, then about the turned z.
+    /// Child axes to parent axes in the reference configuration, where the joint states it: `orientation = (90 deg, 0
+    /// deg, 0 deg)` turns about x, then about the turned y, then about the turned z.
     pub fn joint_orientation(&mut self, joint: usize) -> Option<[[Node; 3]; 3]> {
         if let Some(known) = self.orientations.get(&joint) {
             return *known;

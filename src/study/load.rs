@@ -26,7 +26,8 @@ pub struct Loaded {
     pub directory: PathBuf,
     /// One per source.
     trees: Vec<Arc<Tree>>,
-    /// Texts of the files that tables and elastic bodies name, or why they cannot be read; by index of the study file and path as written.
+    /// Texts of the files that tables and elastic bodies name, or why they cannot be read; by index of the study file
+    /// and path as written.
     table_texts: BTreeMap<(u32, String), Result<Arc<str>, String>>,
 }
 

@@ -1,7 +1,8 @@
 //! The file of modes of an elastic body.
 //!
 //! CSV with one line per mode. Its head names the columns with their units: `frequency [Hz]`, perhaps `damping [1]` and
-//! `modal_mass [kg]` (1 kg), `participation_x [kg]` .. `_z`, `moment_x [kg*m]` .. `_z`, and per frame `tip.shift_x` .. `_z`,
+//! `modal_mass [kg]` (1 kg), `participation_x [kg]` .. `_z`, `moment_x [kg*m]` .. `_z`, and per frame `tip.shift_x` ..
+//! `_z`,
 //! `tip.turn_x [rad/m]` .. `_z`.
 
 use super::elastic::ModeShape;

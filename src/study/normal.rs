@@ -10,8 +10,9 @@ use crate::syntax::{ElementPlace, Name};
 use nalgebra::Vector3;
 
 impl<'a> Checker<'a> {
-    /// What presses the sides of a joint on each other, for effects that rub there: the size of the force that it transmits, of a
-    /// joint that shifts without its direction. `None` where the joint has not exactly one axis, or its direction turns.
+    /// What presses the sides of a joint on each other, for effects that rub there: the size of the force that it
+    /// transmits, of a joint that shifts without its direction. `None` where the joint has not exactly one axis, or its
+    /// direction turns.
     pub fn normal_force(&mut self, effect: usize, name: &'a Name) -> Option<Typed> {
         let declared: &'a super::declarations::Declarations<'a> = self.declared;
         let ElementPlace::On(place) = declared.effects[effect].place else { return None };

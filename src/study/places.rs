@@ -56,8 +56,8 @@ impl<'a> Checker<'a> {
         Some(Place { kind: PlaceKind::Joint, name, motion: Some(motion), dimension, ports: Vec::new(), probes })
     }
 
-    /// Size of what acts on a joint: its elements' loads and the load that accelerates what it moves, as root of the sum of
-    /// squares. A free joint without any element has the second only.
+    /// Size of what acts on a joint: its elements' loads and the load that accelerates what it moves, as root of the
+    /// sum of squares. A free joint without any element has the second only.
     fn load_magnitude(&mut self, symbols: JointSymbols, load: Option<Node>) -> Node {
         let inertia = self.graph.variable(symbols.inertia);
         let acceleration = self.graph.variable(symbols.acceleration);

@@ -192,9 +192,9 @@ impl<'a> Checker<'a> {
         Some(End { body, point, span: name.span })
     }
 
-    /// Joints with prescribed motion come first, then those that have no form as constraints, then those that carry elements or
-    /// are coupled to others, then free ones, then those with the least freedom, so that loops are closed where the fewest constraints arise; among
-    /// equals the ones declared first.
+    /// Joints with prescribed motion come first, then those that have no form as constraints, then those that carry
+    /// elements or are coupled to others, then free ones, then those with the least freedom, so that loops are closed
+    /// where the fewest constraints arise; among equals the ones declared first.
     fn choose_tree(&mut self) {
         let ground = self.declared.bodies.len();
         let node = |end: End| end.body.unwrap_or(ground);

@@ -171,7 +171,8 @@ impl<'a> Checker<'a> {
         self.check_states(index, states);
     }
 
-    /// Derivatives, start values and nominal sizes of all states of an instance have the right dimension; what they are.
+    /// Derivatives, start values and nominal sizes of all states of an instance have the right dimension; what they
+    /// are.
     pub fn check_states(&mut self, index: usize, states: &'a [StateDeclaration]) -> Vec<Option<CheckedState>> {
         let scope = Scope::Instance(index);
         let check = |checker: &mut Self, at: usize, state: &'a StateDeclaration| {

@@ -52,8 +52,8 @@ pub enum ItemKind {
     Group { name: Name, members: Vec<Name> },
     /// `experiment NAME [estimation|validation|test] { fields }`; `start` and `window` are fields.
     Experiment { name: Name, role: Option<Name>, fields: Vec<Field> },
-    /// `manoeuvre NAME "title" { u = 60 mm * smoothstep((t - 1 s) / 20 ms), for 4 s, start = equilibrium }`: what the model is
-    /// used for, without a measurement.
+    /// `manoeuvre NAME "title" { u = 60 mm * smoothstep((t - 1 s) / 20 ms), for 4 s, start = equilibrium }`: what the
+    /// model is used for, without a measurement.
     Manoeuvre { name: Name, title: Option<Name>, durations: Vec<Expression>, fields: Vec<Field> },
     /// `criterion NAME [unit] "title" = max(tyre.force) in MANOEUVRE { below = 12 kN, confidence = 99 % }`
     Criterion {
@@ -243,8 +243,8 @@ pub struct StateDeclaration {
     pub span: Span,
 }
 
-/// What changes states at instants: `when CONDITION { z := EXPRESSION }`, `every PERIOD { z := EXPRESSION }`. Expressions
-/// take the values before.
+/// What changes states at instants: `when CONDITION { z := EXPRESSION }`, `every PERIOD { z := EXPRESSION }`.
+/// Expressions take the values before.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EventDeclaration {
     pub trigger: Trigger,

@@ -223,7 +223,8 @@ impl Roots {
     }
 }
 
-/// The layout of events whose conditions and new values stand in rows in the order of [`crate::mechanics::Event::nodes`].
+/// The layout of events whose conditions and new values stand in rows in the order of
+/// [`crate::mechanics::Event::nodes`].
 fn events(system: &System, program: Program, registers: Vec<u32>, derivative: Derivative) -> Events {
     let mut events = Events { program, registers, derivative, ..Events::default() };
     let mut rows = 0_u32..;
@@ -277,7 +278,8 @@ fn multiply_by_reciprocals(graph: &mut Graph, roots: &[Node], parameters: &[Symb
     roots.iter().map(|root| image[root.index()]).collect()
 }
 
-/// Sums of many terms as trees instead of chains: their additions no longer wait for each other. Changes results by rounding.
+/// Sums of many terms as trees instead of chains: their additions no longer wait for each other. Changes results by
+/// rounding.
 fn balance_sums(graph: &mut Graph, roots: &[Node]) -> Vec<Node> {
     let nodes = graph.reachable(roots);
     let mut uses = vec![0_u32; graph.len()];
@@ -345,8 +347,8 @@ pub(super) enum Dependence {
     State,
 }
 
-/// Symbolic derivatives grow with the number of columns times the length of the program; from this product on, derivatives are
-/// swept through the linearised program instead: slower to evaluate, but compiled in an instant.
+/// Symbolic derivatives grow with the number of columns times the length of the program; from this product on,
+/// derivatives are swept through the linearised program instead: slower to evaluate, but compiled in an instant.
 const SYMBOLIC_LIMIT: usize = 400_000;
 
 const UNASSIGNED: u32 = u32::MAX;

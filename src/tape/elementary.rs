@@ -1,5 +1,6 @@
-//! Elementary functions without branches, so that a loop over them becomes vector instructions; exact to about two units in the
-//! last place, and the same digits whatever the width of the vectors. Products are added without being rounded, on every processor.
+//! Elementary functions without branches, so that a loop over them becomes vector instructions; exact to about two
+//! units in the last place, and the same digits whatever the width of the vectors. Products are added without being
+//! rounded, on every processor.
 //!
 //! Reduction and series after Cody-Waite-1980; the series are those of Taylor, long enough for the reduced range.
 

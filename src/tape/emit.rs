@@ -5,7 +5,8 @@ use super::program::{Instruction, Program};
 use crate::expression::{Binary, Unary};
 use std::fmt::Write;
 
-/// Number of the form of the text (docs/emitted_text.md). The optimisation of tapes changes it more often than the other texts.
+/// Number of the form of the text (docs/emitted_text.md). The optimisation of tapes changes it more often than the
+/// other texts.
 const TAPE_FORM: u32 = 1;
 
 /// All programs of a model, an instruction per line. Registers are `r7`, or the name of what stands in them.

@@ -1,9 +1,9 @@
 //! The linearised rates as a sparse matrix that keeps intermediate results as further unknowns.
 //!
-//! In a mechanism every acceleration depends on every coordinate: the Jacobian of the rates is full. The recursions behind it are
-//! sparse all the same, so that a matrix of coordinates *and* of the recursion's intermediate results has few entries per row
-//! (Griewank-Walther-2008, 10.3). Intermediate results are eliminated here, at compile time, as long as that takes no more
-//! entries than it removes; what remains is left to a sparse factorisation.
+//! In a mechanism every acceleration depends on every coordinate: the Jacobian of the rates is full. The recursions
+//! behind it are sparse all the same, so that a matrix of coordinates *and* of the recursion's intermediate results has
+//! few entries per row (Griewank-Walther-2008, 10.3). Intermediate results are eliminated here, at compile time, as
+//! long as that takes no more entries than it removes; what remains is left to a sparse factorisation.
 
 use super::InputSource;
 use super::sweep::{Scratch, Sweep};
@@ -12,8 +12,8 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 const NONE: u32 = u32::MAX;
-/// All intermediate results are eliminated where the Jacobian itself has at most this many times the entries of the matrix with
-/// those that it pays to keep: factors fill in, and those of a smaller matrix fill in less.
+/// All intermediate results are eliminated where the Jacobian itself has at most this many times the entries of the
+/// matrix with those that it pays to keep: factors fill in, and those of a smaller matrix fill in less.
 const WORTHWHILE: usize = 2;
 
 /// Matrix of `n` variables and m intermediate results.
@@ -127,8 +127,8 @@ impl Nodes {
 }
 
 impl Expansion {
-    /// Of d(`rows`)/d(`columns`) through the instructions of `sweep`; the first `state_count` rows belong to differential
-    /// variables. `jacobian_entries`: structurally non-zero derivatives.
+    /// Of d(`rows`)/d(`columns`) through the instructions of `sweep`; the first `state_count` rows belong to
+    /// differential variables. `jacobian_entries`: structurally non-zero derivatives.
     pub fn new(
         sweep: &Sweep,
         register_count: usize,
@@ -209,8 +209,9 @@ impl Expansion {
         Self { slot_count, seeds, ones, eliminations, products, entries, units, diagonal, pattern }
     }
 
-    /// Values in the order of the pattern: rows of rates as in `c y' - rates` (constraints: `rates`), columns of variables in
-    /// units of `scale`, intermediate results in units of what they are typically. The programs must have run.
+    /// Values in the order of the pattern: rows of rates as in `c y' - rates` (constraints: `rates`), columns of
+    /// variables in units of `scale`, intermediate results in units of what they are typically. The programs must have
+    /// run.
     pub fn evaluate(
         &self,
         (sweep, registers, inputs): (&Sweep, &[f64], &dyn InputSource),
@@ -273,8 +274,8 @@ fn needed(instructions: &[(u32, [Option<u32>; 2])], register_count: usize, rows:
     needed
 }
 
-/// Eliminates instructions (nodes from `first` on), always one with least growth, as long as that changes the number of entries
-/// by at most `largest_growth`.
+/// Eliminates instructions (nodes from `first` on), always one with least growth, as long as that changes the number of
+/// entries by at most `largest_growth`.
 fn eliminate(nodes: &mut Nodes, first: usize, is_left: &mut [bool], largest_growth: i64) {
     let end = is_left.len();
     let mut queue: BinaryHeap<Reverse<(i64, u32)>> = (first as u32..end as u32)

@@ -1,4 +1,5 @@
-//! Execution of runs, compiled once per width of vector registers; the widest that the processor has is chosen at run time.
+//! Execution of runs, compiled once per width of vector registers; the widest that the processor has is chosen at run
+//! time.
 
 use super::InputSource;
 use super::elementary;
@@ -10,8 +11,8 @@ use multiversion::multiversion;
 ///
 /// # Safety
 ///
-/// All operands and targets must be among the `registers`, the former with room for [`LANES`] numbers per block behind the first of
-/// consecutive ones; lists must name as many registers as the blocks of their run have numbers.
+/// All operands and targets must be among the `registers`, the former with room for [`LANES`] numbers per block behind
+/// the first of consecutive ones; lists must name as many registers as the blocks of their run have numbers.
 #[multiversion(targets("x86_64+avx2+fma"))]
 pub(super) unsafe fn execute(runs: &[Run], listed: &[u32], registers: &mut [f64], inputs: &dyn InputSource) {
     for run in runs {

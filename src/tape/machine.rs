@@ -1,8 +1,9 @@
-//! Programs as machine code (Cranelift): short runs become single instructions, long ones stay calls of the interpreter's vector
-//! kernels, so that neither dispatch nor the lack of vector instructions costs time.
+//! Programs as machine code (Cranelift): short runs become single instructions, long ones stay calls of the
+//! interpreter's vector kernels, so that neither dispatch nor the lack of vector instructions costs time.
 //!
-//! The code performs the same operations in the same order as [`super::kernels`], with the same functions: results agree to the
-//! last bit. Where no code can be made - an unknown processor, a system that forbids it - the interpreter does the work.
+//! The code performs the same operations in the same order as [`super::kernels`], with the same functions: results
+//! agree to the last bit. Where no code can be made - an unknown processor, a system that forbids it - the interpreter
+//! does the work.
 
 use super::InputSource;
 use super::program::{Instruction, Line, Run};
@@ -21,7 +22,8 @@ use std::collections::HashMap;
 /// The registers, and the inputs as a pointer to a reference.
 type Entry = unsafe extern "C" fn(*mut f64, *const &dyn InputSource);
 
-/// From about these lengths on a run is faster in a kernel: of arithmetic, and of functions that are calls as single instructions.
+/// From about these lengths on a run is faster in a kernel: of arithmetic, and of functions that are calls as single
+/// instructions.
 const LONG_RUN: usize = 12;
 const LONG_RUN_OF_CALLS: usize = 3;
 
@@ -71,8 +73,8 @@ struct Runs {
 }
 
 impl Machine {
-    /// Code for a program of `lines` in `runs` with their lists over `register_count` registers; none where the system does not
-    /// allow it.
+    /// Code for a program of `lines` in `runs` with their lists over `register_count` registers; none where the system
+    /// does not allow it.
     pub fn new(lines: &[Line], (runs, listed): (&[Run], &[u32]), register_count: usize) -> Option<Self> {
         let owned = Box::new(Runs { runs: runs.to_vec(), listed: listed.to_vec(), register_count });
         let mut flags = settings::builder();

@@ -1,14 +1,16 @@
 //! Equations as straight-line programs.
 //!
-//! *In*: a [`crate::mechanics::System`]. *Out*: a [`Model`]: tapes for rates, their sparse Jacobian, parameter derivatives, outputs
-//! and their derivatives, probes, start values. [`Bound`] evaluates them for one parameter vector and one set of inputs.
-//! *Must not happen here*: symbolic manipulation beyond asking the graph for derivatives, knowledge of mechanics or data.
+//! *In*: a [`crate::mechanics::System`]. *Out*: a [`Model`]: tapes for rates, their sparse Jacobian, parameter
+//! derivatives, outputs and their derivatives, probes, start values. [`Bound`] evaluates them for one parameter vector
+//! and one set of inputs.
+//! *Must not happen here*: symbolic manipulation beyond asking the graph for derivatives, knowledge of mechanics or
+//! data.
 //!
-//! A [`Model`] is immutable and shared between threads; all memory of an evaluation is in [`Bound`]. Nodes that depend on
-//! parameters only are computed once per parameter vector, nodes of time and inputs once per time.
+//! A [`Model`] is immutable and shared between threads; all memory of an evaluation is in [`Bound`]. Nodes that depend
+//! on parameters only are computed once per parameter vector, nodes of time and inputs once per time.
 //!
-//! A program is executed run by run of equal instructions; one of short runs that is executed often becomes machine code, which
-//! gives the same digits.
+//! A program is executed run by run of equal instructions; one of short runs that is executed often becomes machine
+//! code, which gives the same digits.
 
 mod bound;
 mod compile;

@@ -67,7 +67,8 @@ pub(super) enum Form {
 
 /// `count` times the same instruction; results go to consecutive registers, operands stand below the first of them.
 ///
-/// Dispatch is paid per run instead of per instruction, and a run is a loop of independent operations: vector instructions.
+/// Dispatch is paid per run instead of per instruction, and a run is a loop of independent operations: vector
+/// instructions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Run {
     pub instruction: Instruction,
@@ -194,7 +195,8 @@ impl Program {
         if let Some(machine) = translation.machine.get() {
             return machine.as_ref();
         }
-        // Executions of other threads may get lost in this count, which does no harm and costs less than to count them all.
+        // Executions of other threads may get lost in this count, which does no harm and costs less than to count them
+        // all.
         let executions = translation.executions.load(Ordering::Relaxed);
         translation.executions.store(executions + 1, Ordering::Relaxed);
         if executions < MANY_EXECUTIONS { None } else { translation.machine.get_or_init(|| self.translate()).as_ref() }

@@ -6,8 +6,8 @@ use super::program::{Instruction, Line};
 use crate::expression::{Binary, Node, Operation};
 use std::collections::{BTreeMap, HashMap};
 
-/// Runs of operands in consecutive registers are set apart from this length on; shorter ones cost more to start than they save
-/// (both lengths as timed on processors with registers of four numbers).
+/// Runs of operands in consecutive registers are set apart from this length on; shorter ones cost more to start than
+/// they save (both lengths as timed on processors with registers of four numbers).
 const SHORTEST_CHAIN: usize = 6;
 /// From this length on they need no copies to be as fast.
 const LONG_CHAIN: usize = 24;
@@ -22,9 +22,9 @@ struct Candidate {
 }
 
 impl Assembler<'_> {
-    /// Assigns registers in an order in which equal instructions follow each other: always all ready nodes of the instruction
-    /// that has most of them. With `copies`, operands that only parameters determine may be copied to where they are
-    /// neighbours; [`Assembler::take_copies`] tells these.
+    /// Assigns registers in an order in which equal instructions follow each other: always all ready nodes of the
+    /// instruction that has most of them. With `copies`, operands that only parameters determine may be copied to where
+    /// they are neighbours; [`Assembler::take_copies`] tells these.
     pub(super) fn schedule(&mut self, nodes: &[Node], copies: bool) -> Vec<Vec<Line>> {
         let mut position = vec![usize::MAX; nodes.last().map_or(0, |node| node.index() + 1)];
         nodes.iter().enumerate().for_each(|(i, node)| position[node.index()] = i);
@@ -171,13 +171,15 @@ fn neighbours(mut batch: Vec<Candidate>, shortest: usize, found: &mut Vec<Chain>
     rest
 }
 
-/// Chains of two operands in which `operand` is fixed, the other not, and goes on to the next register; returns what is in none.
+/// Chains of two operands in which `operand` is fixed, the other not, and goes on to the next register; returns what is
+/// in none.
 fn beside_fixed(rest: Vec<Candidate>, operand: usize, found: &mut Vec<Chain>) -> Vec<Candidate> {
     let other = 1 - operand;
     let (mut suitable, mut others): (Vec<Candidate>, Vec<Candidate>) =
         rest.into_iter().partition(|c| c.fixed[operand] && !c.fixed[other] && c.operands[2] == 0);
     suitable.sort_unstable_by_key(|candidate| (candidate.operands[other], candidate.operands[operand]));
-    // The same register may stand beside several fixed ones: a chain takes the first of them, the next chain the second.
+    // The same register may stand beside several fixed ones: a chain takes the first of them, the next chain the
+    // second.
     while !suitable.is_empty() {
         let mut layer: Vec<Candidate> = Vec::new();
         let mut later = Vec::new();

@@ -1,5 +1,5 @@
-//! Derivatives of single instructions as numbers, for sweeps and dual numbers. At kinks they take the same side as the symbolic
-//! ones ([`crate::expression::Graph::differentiate`]).
+//! Derivatives of single instructions as numbers, for sweeps and dual numbers. At kinks they take the same side as the
+//! symbolic ones ([`crate::expression::Graph::differentiate`]).
 
 use crate::expression::{Binary, Unary};
 

@@ -1,8 +1,8 @@
 //! Derivatives of large programs without symbolic expressions: tangents pushed forward through the linearised
 //! instructions, several columns at a time (Griewank-Walther-2008, chapters 3 and 7).
 //!
-//! The text of a symbolic Jacobian grows with the number of columns times the length of the program; a sweep stores per group
-//! of columns only the list of instructions that they reach.
+//! The text of a symbolic Jacobian grows with the number of columns times the length of the program; a sweep stores per
+//! group of columns only the list of instructions that they reach.
 
 use super::InputSource;
 use super::model::Element;
@@ -87,8 +87,9 @@ impl Reach {
 }
 
 impl Sweep {
-    /// d(`rows`)/d(`columns`) through `programs`, which run one after the other over a file of `register_count` registers.
-    /// Every element gets a register of its own, counted up from `next`; returned with row, column and register (slot 0).
+    /// d(`rows`)/d(`columns`) through `programs`, which run one after the other over a file of `register_count`
+    /// registers. Every element gets a register of its own, counted up from `next`; returned with row, column and
+    /// register (slot 0).
     pub fn new(
         programs: &[&Program],
         register_count: usize,

@@ -29,7 +29,8 @@ impl Program {
     }
 }
 
-/// What the operands' slopes `da`, `db` give; an operand that does not move adds nothing, even where its factor is infinite.
+/// What the operands' slopes `da`, `db` give; an operand that does not move adds nothing, even where its factor is
+/// infinite.
 fn carried(factors: [f64; 2], slopes: [f64; 2]) -> f64 {
     factors.into_iter().zip(slopes).filter(|(_, slope)| *slope != 0.0).map(|(factor, slope)| factor * slope).sum()
 }

@@ -13,8 +13,8 @@ use rayon::prelude::*;
 
 const REPETITIONS: u64 = 500;
 
-/// A coverage of 95 % has a standard error of 0.97 % in 500 repetitions: the mean over a study's parameters is asserted to lie in
-/// 93 to 97 %, each parameter by itself within three standard errors.
+/// A coverage of 95 % has a standard error of 0.97 % in 500 repetitions: the mean over a study's parameters is asserted
+/// to lie in 93 to 97 %, each parameter by itself within three standard errors.
 fn honest(wanted: impl Fn(&Case) -> bool) {
     for case in cases().iter().filter(|case| wanted(case)) {
         let result = repeat(case, REPETITIONS, 20);
@@ -29,8 +29,8 @@ fn honest(wanted: impl Fn(&Case) -> bool) {
     }
 }
 
-/// One channel has its noise above the band of the motion, the other within it, both of the same deviation: weights that know the
-/// colour trust the first, and the intervals say how much better that is.
+/// One channel has its noise above the band of the motion, the other within it, both of the same deviation: weights
+/// that know the colour trust the first, and the intervals say how much better that is.
 #[test]
 fn weights_for_coloured_noise_make_better_estimates() {
     const RUNS: u64 = 100;
@@ -65,7 +65,8 @@ fn weights_for_coloured_noise_make_better_estimates() {
     assert!((88..=100).contains(&held), "{held}");
 }
 
-/// Where the fit weights by the noise's colour the profile does, too: its ends are those of the interval in a nearly linear model.
+/// Where the fit weights by the noise's colour the profile does, too: its ends are those of the interval in a nearly
+/// linear model.
 #[test]
 fn profiles_weight_as_the_fit_does() {
     let (compiled, records) = compiled(&loaded("spring_slide"));

@@ -61,8 +61,8 @@ fn wobble(c: f64, mu: f64, process: f64, noise: f64, samples: usize, step: f64, 
     states.take(samples).map(|state| state[0] + noise * stream.borrow_mut().normal()).collect()
 }
 
-/// Without noise the equations of motion give the parameters: in one linear step where they are linear (mass known), in a few
-/// otherwise.
+/// Without noise the equations of motion give the parameters: in one linear step where they are linear (mass known), in
+/// a few otherwise.
 #[test]
 fn equation_error_is_exact_without_noise() {
     let (compiled, records) = compiled(&loaded("spring_slide"));
@@ -83,9 +83,9 @@ fn equation_error_is_exact_without_noise() {
     }
 }
 
-/// A prior is one more row beside equations of variance one. It pulls by its share of what is known, so that the estimates with a
-/// prior at d + s and d - s lie as far apart as a normal prior of that width says: with v the variance without prior,
-/// 2 s v / (v + s^2). A wide prior changes nothing, a narrow one decides.
+/// A prior is one more row beside equations of variance one. It pulls by its share of what is known, so that the
+/// estimates with a prior at d + s and d - s lie as far apart as a normal prior of that width says: with v the variance
+/// without prior, 2 s v / (v + s^2). A wide prior changes nothing, a narrow one decides.
 #[test]
 fn equation_error_weighs_priors() {
     let (base, records) = compiled(&loaded("spring_slide"));
@@ -119,8 +119,8 @@ fn equation_error_names_what_is_not_measured() {
     assert!(refusal.message.contains("table_guide.position"), "{}", refusal.message);
 }
 
-/// Process noise turns the phase of a self-excited block: the output error takes that for damping, the filter error does not,
-/// and its intervals hold the truth.
+/// Process noise turns the phase of a self-excited block: the output error takes that for damping, the filter error
+/// does not, and its intervals hold the truth.
 #[test]
 fn the_filter_error_is_right_where_the_process_is_noisy() {
     const RUNS: u64 = 8;
@@ -168,8 +168,8 @@ fn multiple_shooting_finds_what_single_shooting_misses() {
     }
 }
 
-/// The shipped field test asks for the filter error by itself: numbers and road of the independent simulator are found, and profiles
-/// under the filter's weights end where the intervals do. A free simulation is soon out of step.
+/// The shipped field test asks for the filter error by itself: numbers and road of the independent simulator are found,
+/// and profiles under the filter's weights end where the intervals do. A free simulation is soon out of step.
 #[test]
 fn the_field_test_needs_the_filter_error() {
     let (compiled, records) = compiled(&loaded("caster_shimmy"));

@@ -3,8 +3,8 @@
 use crate::shipped::{compiled, fitted, loaded};
 use ident::identify::{Settings, confidence};
 
-/// What the independent generator was given is found, within the intervals widened by what three modes leave out of a beam with a
-/// payload, and nothing but noise is left over.
+/// What the independent generator was given is found, within the intervals widened by what three modes leave out of a
+/// beam with a payload, and nothing but noise is left over.
 #[test]
 fn modes_and_payload_of_an_elastic_arm_are_identified() {
     let (compiled, records) = compiled(&loaded("elastic_arm"));

@@ -113,8 +113,8 @@ fn what_no_test_determines_is_named_before() {
     assert!(helped.together.undetermined.is_empty());
 }
 
-/// Every listed choice is the best of its size by an independent count, and more is listed only where it helps; what limits the test is
-/// named with the repetitions that deviations over roots promise.
+/// Every listed choice is the best of its size by an independent count, and more is listed only where it helps; what
+/// limits the test is named with the repetitions that deviations over roots promise.
 #[test]
 fn tests_and_sensors_are_chosen_together() {
     let compiled = spring_slide();

@@ -5,8 +5,8 @@ use ident::analyse::{courses, cuts};
 use ident::identify::Settings;
 use ident::simulation::Record;
 
-/// Three and six parameters (Figs. 3.4 and 3.5 of the document): Levenberg-Marquardt needs the least work; the others end at the
-/// same cost where they converge.
+/// Three and six parameters (Figs. 3.4 and 3.5 of the document): Levenberg-Marquardt needs the least work; the others
+/// end at the same cost where they converge.
 #[test]
 fn levenberg_marquardt_needs_the_fewest_simulations() {
     let chosen = ["c_tyre", "c_strut", "d_rebound"].map(str::to_owned);

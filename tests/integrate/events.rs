@@ -168,8 +168,8 @@ fn bounces_without_end_are_a_failure() {
     assert!(failure.work.events.len() > 20);
 }
 
-/// Mass 1 dragged over a surface by a spring whose end moves at a constant speed. Parameters: stiffness, friction at rest
-/// and in motion, speed.
+/// Mass 1 dragged over a surface by a spring whose end moves at a constant speed. Parameters: stiffness, friction at
+/// rest and in motion, speed.
 struct StickSlip {
     sticks: bool,
 }

@@ -189,6 +189,7 @@ impl Builder {
             symbol,
             derivative: zero,
             initial: zero,
+            nominal: None,
             dimension: Dimension { length: 1, ..Dimension::default() },
             span: Span::default(),
         });

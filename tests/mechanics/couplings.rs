@@ -22,8 +22,8 @@ fn assert_follows(channels: &Channels, name: &str, size: f64, exact: impl Fn(f64
     }
 }
 
-/// Motor and wheel on a reduction of 4, a spring on the wheel: inertia and stiffness at the motor divided by the ratio squared. The
-/// friction in the gears takes a share of the torque that they transmit.
+/// Motor and wheel on a reduction of 4, a spring on the wheel: inertia and stiffness at the motor divided by the ratio
+/// squared. The friction in the gears takes a share of the torque that they transmit.
 #[test]
 fn a_reduction_reflects_inertia_and_stiffness() {
     let (j_motor, j_wheel, torque, ratio, stiffness) = (2e-3, 0.08, 0.5, 4.0, 1.6);
@@ -122,7 +122,8 @@ fn racks_ropes_and_screws_carry_weights() {
     assert_follows(&channels, "thrust", 40.0, |_| 4.0 * (nut + g));
 }
 
-/// A driven cam lifts a follower on a spring; its drive bears the torque, the joint transmitting it and the cam's share together. A rope of given length over a fixed peg, by points.
+/// A driven cam lifts a follower on a spring; its drive bears the torque, the joint transmitting it and the cam's share
+/// together. A rope of given length over a fixed peg, by points.
 #[test]
 fn cams_and_ropes_are_relations_of_any_form() {
     let channels = one(
@@ -153,7 +154,8 @@ fn cams_and_ropes_are_relations_of_any_form() {
     assert_follows(&channels, "apart", 1.0, |_| 0.0);
 }
 
-/// Couplings that say the same are told, those that contradict each other leave no motion; a start that does not fit is moved.
+/// Couplings that say the same are told, those that contradict each other leave no motion; a start that does not fit is
+/// moved.
 #[test]
 fn couplings_that_do_not_fit_are_named() {
     let shafts = "body a { mass = 1 kg, inertia = 1 kg*m^2 }\nbody b { mass = 1 kg, inertia = 1 kg*m^2 }\n\
@@ -174,8 +176,8 @@ fn couplings_that_do_not_fit_are_named() {
     assert!(moved.is_ok());
 }
 
-/// The ratio of a gear and the radius of a pinion identified: the angle's slopes by them are those of the closed form, and the
-/// gradient that of the discrete solution.
+/// The ratio of a gear and the radius of a pinion identified: the angle's slopes by them are those of the closed form,
+/// and the gradient that of the discrete solution.
 #[test]
 fn ratios_have_exact_gradients() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,5 @@
-//! Effects at places of their own kind against closed solutions: gravity that is not level, friction by what a joint carries.
+//! Effects at places of their own kind against closed solutions: gravity that is not level, friction by what a joint
+//! carries.
 
 use crate::run::run;
 

@@ -28,8 +28,8 @@ fn frequency(b: f64) -> f64 {
     b * b * (STIFFNESS / (MASS / LENGTH)).sqrt() / (LENGTH * LENGTH) / TAU
 }
 
-/// Wave number and shape at the end (deflection, slope, integral, first moment) of the modes of a clamped beam, scaled to a
-/// modal mass of 1 kg.
+/// Wave number and shape at the end (deflection, slope, integral, first moment) of the modes of a clamped beam, scaled
+/// to a modal mass of 1 kg.
 fn clamped(number: usize) -> (f64, [f64; 4]) {
     let b = root(|b| b.cos() + 1.0 / b.cosh(), (number as f64 - 0.5) * PI);
     let sigma = (b.cosh() + b.cos()) / (b.sinh() + b.sin());
@@ -104,8 +104,8 @@ fn assert_near(found: f64, expected: f64, accuracy: f64) {
     assert!((found - expected).abs() <= accuracy * expected.abs(), "{found} instead of {expected}");
 }
 
-/// Load and moment at the end of a cantilever: `F l^3 / (3 E I)` and `F l^2 / (2 E I)`, approached by the exact series, and the
-/// reactions at the clamp.
+/// Load and moment at the end of a cantilever: `F l^3 / (3 E I)` and `F l^2 / (2 E I)`, approached by the exact series,
+/// and the reactions at the clamp.
 #[test]
 fn cantilever_bends_as_the_beam_does() {
     let force = 3.0;
@@ -142,8 +142,8 @@ fn cantilever_bends_as_the_beam_does() {
     }
 }
 
-/// The modes of the clamped beam on other supports: hinged, free, with a mass at its end, clamped at the other end. Roots of
-/// the frequency equations of Euler and Bernoulli.
+/// The modes of the clamped beam on other supports: hinged, free, with a mass at its end, clamped at the other end.
+/// Roots of the frequency equations of Euler and Bernoulli.
 #[test]
 fn clamped_modes_serve_every_support() {
     // Hinged at one end: tan b = tanh b.
@@ -180,8 +180,8 @@ fn clamped_modes_serve_every_support() {
     assert_near(own[0], loaded, 1e-5);
     assert_near(own[1], loaded, 1e-5);
 
-    // Held at its tip the beam is a cantilever again: the joint stands on a frame that the modes move. These modes have no
-    // curvature there, so that the error falls with the number of modes only; what it falls to is right.
+    // Held at its tip the beam is a cantilever again: the joint stands on a frame that the modes move. These modes have
+    // no curvature there, so that the error falls with the number of modes only; what it falls to is right.
     let text = |count: usize| {
         format!("study turned\n{}joint clamp: fixed ground -> beam.tip\n", beam(&format!("mode_count = {count}")))
     };
@@ -262,7 +262,8 @@ fn no_modes_is_rigid() {
     assert_eq!(rigid[0]["z"], elastic[0]["z"]);
 }
 
-/// A body of point masses with random mode shapes, hinged at one of its frames, a block on a universal joint at another.
+/// A body of point masses with random mode shapes, hinged at one of its frames, a block on a universal joint at
+/// another.
 struct Lumps {
     masses: Vec<f64>,
     places: Vec<Vector3<f64>>,
@@ -460,7 +461,8 @@ fn cardan([x, y, z]: [f64; 3]) -> Rotation3<f64> {
         * Rotation3::from_axis_angle(&Vector3::z_axis(), z)
 }
 
-/// An elastic body in space that is carried by one of its elastic frames and carries a block on another, at random states.
+/// An elastic body in space that is carried by one of its elastic frames and carries a block on another, at random
+/// states.
 #[test]
 fn elastic_chain_accelerates_as_lagrange_says() {
     let mut state = 12345_u64;

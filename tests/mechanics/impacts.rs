@@ -150,8 +150,8 @@ fn a_run_goes_on_behind_the_impact() {
     }
 }
 
-/// Friction in proportion to what the guide of a spatial slider-crank transmits, the crank being driven: the slider's own
-/// equation of motion holds, with a normal force that the friction itself changes through the connecting rod.
+/// Friction in proportion to what the guide of a spatial slider-crank transmits, the crank being driven: the slider's
+/// own equation of motion holds, with a normal force that the friction itself changes through the connecting rod.
 #[test]
 fn friction_by_the_reaction_of_a_driven_spatial_loop() {
     let text = "study slider_crank

@@ -23,8 +23,8 @@ fn assert_near(channel: &[f64], accuracy: f64, expected: impl Fn(usize) -> f64) 
     }
 }
 
-/// Peaucellier's inversor draws a straight line: the product of the distances of its two ends from the pivot is that of the links'
-/// squares. More is stated than its one freedom: the first of it is kept, the rest says which way it stands.
+/// Peaucellier's inversor draws a straight line: the product of the distances of its two ends from the pivot is that of
+/// the links' squares. More is stated than its one freedom: the first of it is kept, the rest says which way it stands.
 #[test]
 fn peaucellier_draws_a_straight_line() {
     let short =
@@ -58,8 +58,8 @@ fn peaucellier_draws_a_straight_line() {
     assert!(crate::run::drift(&own["y"]) > 0.05);
 }
 
-/// Two Hooke joints between parallel shafts: of constant ratio where the yokes of the shaft between lie in one plane; else its
-/// irregularity twice.
+/// Two Hooke joints between parallel shafts: of constant ratio where the yokes of the shaft between lie in one plane;
+/// else its irregularity twice.
 #[test]
 fn double_hooke_joint_depends_on_its_phase() {
     let bend = 20.0_f64.to_radians();
@@ -152,8 +152,8 @@ fn six_legs_carry_a_plate() {
     }
 }
 
-/// A rotor of prescribed spin in two gimbals, its mass off the pivot: Lagrange's equations of the two angles, by Runge and Kutta, and
-/// the torque that holds the spin.
+/// A rotor of prescribed spin in two gimbals, its mass off the pivot: Lagrange's equations of the two angles, by Runge
+/// and Kutta, and the torque that holds the spin.
 #[test]
 fn a_gyroscope_in_gimbals_precesses_and_nods() {
     let own = one("study gimbals\ngravity = 9.81 m/s^2 along -z\nsolver { tolerance = 1e-10 }
@@ -236,7 +236,8 @@ fn a_parallelogram_branches_where_it_is_flat() {
     assert!(cautions(&held, &manoeuvre(&held.study, 0), &[]).is_empty());
 }
 
-/// A coupling that decides in the flat position is not called redundant, and needs no other start values than one crank's, flat or not.
+/// A coupling that decides in the flat position is not called redundant, and needs no other start values than one
+/// crank's, flat or not.
 #[test]
 fn a_coupling_leads_a_parallelogram_through_its_flat_position() {
     let same = "coupling same: crank_1.position = crank_2.position";
@@ -276,7 +277,8 @@ fn joints_with_motions_that_fall_together_are_named() {
     assert!(failure.help.contains("joint `slide` are not independent"), "{}", failure.help);
 }
 
-/// A rod whose tube axis runs through its ball spins about itself only: the crank cannot move, and a start that says it does is told.
+/// A rod whose tube axis runs through its ball spins about itself only: the crank cannot move, and a start that says it
+/// does is told.
 #[test]
 fn a_start_speed_that_the_loops_do_not_allow_is_told() {
     let locked = compiled(

@@ -1,6 +1,7 @@
-//! Equations of motion of mechanisms with closed loops at random states: positions and velocities drawn by chance and brought onto
-//! the constraints, then accelerations of all bodies and reactions of all joints against Newton's and Euler's equations of the
-//! single bodies, solved as one dense system for accelerations, joint accelerations and all six reactions of every joint.
+//! Equations of motion of mechanisms with closed loops at random states: positions and velocities drawn by chance and
+//! brought onto the constraints, then accelerations of all bodies and reactions of all joints against Newton's and
+//! Euler's equations of the single bodies, solved as one dense system for accelerations, joint accelerations and all
+//! six reactions of every joint.
 
 use crate::newton_euler::{M, Mechanism, V, measures, suspension};
 use crate::run::checked;
@@ -188,8 +189,9 @@ fn unit(i: usize) -> V {
     V::from_fn(|k, _| if k == i { 1.0 } else { 0.0 })
 }
 
-/// What each free coordinate of a joint does: angular and linear acceleration of the child at its attachment per unit, the load on it
-/// per force and moment there; and the accelerations without any of them. Plain composition of moving frames.
+/// What each free coordinate of a joint does: angular and linear acceleration of the child at its attachment per unit,
+/// the load on it per force and moment there; and the accelerations without any of them. Plain composition of moving
+/// frames.
 struct Passage {
     free: Vec<(V, V)>,
     alpha: V,

@@ -1,5 +1,5 @@
-//! Every law of the prelude against its formula written by hand; laws with states against a fixed-step integration in this
-//! file, along a prescribed motion.
+//! Every law of the prelude against its formula written by hand; laws with states against a fixed-step integration in
+//! this file, along a prescribed motion.
 
 use crate::evaluate::{close, study, value};
 use ident::simulation::{Compiled, Gradient, excitation, simulate};
@@ -244,8 +244,8 @@ fn branches_with_dampers_settle_to_their_complex_stiffness() {
     agree("relaxing_spring", &history("relaxing_spring", fields), &both);
 }
 
-/// A trace of 1e-20 decays over an intermediate: b = a_0 (exp(-t) - exp(-2 t)). By its unit the error of a ratio is measured by 1e-4
-/// near zero, and the trace would pass for nothing.
+/// A trace of 1e-20 decays over an intermediate: b = a_0 (exp(-t) - exp(-2 t)). By its unit the error of a ratio is
+/// measured by 1e-4 near zero, and the trace would pass for nothing.
 #[test]
 fn states_far_from_their_unit_state_their_nominal_size() {
     let errors = ["", " nominal 1e-20"].map(|nominal| {
@@ -303,7 +303,8 @@ fn a_torsion_spring_swings_with_its_frequency() {
     }
 }
 
-/// Between two shafts that turn on and on: the twist is that of the two flywheels against each other, not cut at half a turn.
+/// Between two shafts that turn on and on: the twist is that of the two flywheels against each other, not cut at half a
+/// turn.
 #[test]
 fn a_torsion_spring_between_turning_shafts_sees_the_twist_alone() {
     let study = study(

@@ -1,5 +1,5 @@
-//! Every example of the language reference is part of a study that compiles to equations: what it leaves out is added here, by
-//! heading and number.
+//! Every example of the language reference is part of a study that compiles to equations: what it leaves out is added
+//! here, by heading and number.
 
 use ident::diagnostics::{Diagnostic, render};
 use ident::mechanics::derive;

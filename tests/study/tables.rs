@@ -140,7 +140,8 @@ fn long_tables_are_treated() {
     close(value(&study, height, &[("t", 0.125 + 16.0 / 20.0)]), 1.6e-3);
 }
 
-/// A record of hundreds of thousands of points is no part of the equations: it compiles as fast as a short one and is run over.
+/// A record of hundreds of thousands of points is no part of the equations: it compiles as fast as a short one and is
+/// run over.
 #[test]
 fn records_of_any_length_are_treated() {
     use ident::simulation::{Compiled, Gradient, manoeuvre, simulate};

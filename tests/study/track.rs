@@ -111,8 +111,8 @@ fn rail() -> Compiled {
     Compiled::new(checked.study).unwrap_or_else(|f| panic!("{}", render(&f, &loaded.sources, false)))
 }
 
-/// At constant speed both wheels are bodies on springs over a track that is a function of time: the axle boxes' accelerations
-/// of a run agree with a fixed-step integration of the same four equations; the rear one arrives late.
+/// At constant speed both wheels are bodies on springs over a track that is a function of time: the axle boxes'
+/// accelerations of a run agree with a fixed-step integration of the same four equations; the rear one arrives late.
 #[test]
 fn wheels_on_an_uneven_track() {
     let compiled = rail();

@@ -1,5 +1,5 @@
-//! Identifications repeated with fresh noise: how often the intervals hold the truth, and whether the noise's variance comes out
-//! right.
+//! Identifications repeated with fresh noise: how often the intervals hold the truth, and whether the noise's variance
+//! comes out right.
 
 #![allow(dead_code, reason = "each user looks at another part")]
 
@@ -60,8 +60,8 @@ const COLOURED: Colour = Colour::Coloured(0.9, -0.3);
 /// That of the records of `swaying_sensor`, whose study asks for coloured noise.
 const SWAYING: Colour = Colour::Coloured(1.6, -0.8);
 
-/// Three studies, each with white noise, behind a prefilter, with coloured noise, and with weights that know the colour; one that ships
-/// with coloured noise.
+/// Three studies, each with white noise, behind a prefilter, with coloured noise, and with weights that know the
+/// colour; one that ships with coloured noise.
 pub fn cases() -> Vec<Case> {
     let studies = [("spring_slide", FAST), ("two_mass", FAST), ("crane_pendulum", SLOW)];
     let of = |(study, filter): (&'static str, &'static str)| {
@@ -98,7 +98,8 @@ pub struct Repeated {
     pub variance_ratio: Vec<f64>,
 }
 
-/// One repetition: per parameter estimate, standard deviation, whether the interval holds the truth; per channel the noise's level.
+/// One repetition: per parameter estimate, standard deviation, whether the interval holds the truth; per channel the
+/// noise's level.
 type Outcome = (Vec<(f64, f64, bool)>, Vec<f64>);
 
 /// The model itself with the study's start values is the truth; fits start a twentieth of the bounds away from it.

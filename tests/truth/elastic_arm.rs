@@ -1,8 +1,8 @@
-//! An elastic arm on a driven hub, with a payload at its end, turning in a horizontal plane: finite elements of the beam
-//! (cubic shapes) in axes that turn with the hub.
+//! An elastic arm on a driven hub, with a payload at its end, turning in a horizontal plane: finite elements of the
+//! beam (cubic shapes) in axes that turn with the hub.
 //!
-//! Kinetic energy to second order in the deflection `w`: `J t'^2 / 2 + t' (m . w') + w' M w' / 2 + t'^2 w (M - G) w / 2` with the
-//! hub's angle `t`; `G` is what the centrifugal tension stiffens (Schwertassek-Wallrapp-1999).
+//! Kinetic energy to second order in the deflection `w`: `J t'^2 / 2 + t' (m . w') + w' M w' / 2 + t'^2 w (M - G) w /
+//! 2` with the hub's angle `t`; `G` is what the centrifugal tension stiffens (Schwertassek-Wallrapp-1999).
 
 use super::excitation::Multisine;
 use super::random::Random;
@@ -200,7 +200,8 @@ pub fn frequencies_of_elements() -> Vec<f64> {
     squares.into_iter().map(|square| square.sqrt() / std::f64::consts::TAU).collect()
 }
 
-/// The modes of the clamped arm as its drawing has them, from the solution of Euler and Bernoulli: the file that the study reads.
+/// The modes of the clamped arm as its drawing has them, from the solution of Euler and Bernoulli: the file that the
+/// study reads.
 pub fn modes(count: usize) -> String {
     let mut text = format!(
         "# Uniform arm of {LENGTH} m and {MASS} kg along x, EI = {STIFFNESS} N*m^2, clamped at its origin, bending along y.\n\

@@ -1,7 +1,7 @@
 //! A mechanism with one coordinate that noise pushes at random.
 
-/// The states (coordinate, rate) at all samples, one after the other: the drift by classical Runge-Kutta, the kicks (root of the
-/// spectral density of the acceleration) by Euler and Maruyama, `substeps` of `h` between samples.
+/// The states (coordinate, rate) at all samples, one after the other: the drift by classical Runge-Kutta, the kicks
+/// (root of the spectral density of the acceleration) by Euler and Maruyama, `substeps` of `h` between samples.
 pub fn kicked(
     rates: impl Fn([f64; 2]) -> [f64; 2],
     start: [f64; 2],

@@ -11,7 +11,8 @@ use std::path::Path;
 /// Standard deviation of the noise as a share of each channel's rms value.
 pub const NOISE: f64 = 0.01;
 
-/// Noise of a channel: its share of the channel's rms value, and the coefficients by which a sample follows from the two before.
+/// Noise of a channel: its share of the channel's rms value, and the coefficients by which a sample follows from the
+/// two before.
 #[derive(Clone, Copy)]
 pub struct Noise {
     pub share: f64,

@@ -1,4 +1,5 @@
-//! A towed wheel that swivels by itself while a rough road pushes it at random: noise in the process, not only in the measurement.
+//! A towed wheel that swivels by itself while a rough road pushes it at random: noise in the process, not only in the
+//! measurement.
 
 use super::kicked::kicked;
 use super::random::Random;

@@ -45,11 +45,11 @@ pub struct Excitation {
     pub outcome: Outcome,
     /// Rate that resolves what the parameters do, Hz.
     pub useful_rate: f64,
-    /// Duration after which every parameter and criterion is as accurate as wanted, s; absent where the whole manoeuvre is not
-    /// enough.
+    /// Duration after which every parameter and criterion is as accurate as wanted, s; absent where the whole manoeuvre
+    /// is not enough.
     pub sufficient_duration: Option<f64>,
-    /// Repetitions (or factor on the rate, as long as the noise stays white) that make every parameter and criterion as accurate as
-    /// wanted; absent where something stays undetermined.
+    /// Repetitions (or factor on the rate, as long as the noise stays white) that make every parameter and criterion as
+    /// accurate as wanted; absent where something stays undetermined.
     pub repetitions: Option<f64>,
     /// The same one by one.
     pub needs: Vec<Need>,
@@ -67,8 +67,8 @@ pub struct Need {
     pub wanted: f64,
     /// Duration after which it is as accurate, s; absent where the whole manoeuvre is not enough.
     pub duration: Option<f64>,
-    /// Repetitions, or factor on the sampling rate as long as the noise stays white: a fraction where less than the manoeuvre is
-    /// enough; absent where it stays undetermined.
+    /// Repetitions, or factor on the sampling rate as long as the noise stays white: a fraction where less than the
+    /// manoeuvre is enough; absent where it stays undetermined.
     pub repetitions: Option<f64>,
     /// The rate that does it in the manoeuvre's duration, not below the useful one, Hz.
     pub rate: Option<f64>,

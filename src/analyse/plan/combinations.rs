@@ -1,4 +1,5 @@
-//! Which of the offered tests and sensors belong together: exactly where the choices can be counted, else one after the other.
+//! Which of the offered tests and sensors belong together: exactly where the choices can be counted, else one after the
+//! other.
 
 use super::add;
 use schemars::JsonSchema;
@@ -28,7 +29,8 @@ pub struct Combination {
     pub exact: bool,
 }
 
-/// What an information matrix is worth: directions that stay undetermined, and the measures (`None` where one is infinite).
+/// What an information matrix is worth: directions that stay undetermined, and the measures (`None` where one is
+/// infinite).
 #[derive(Clone, Debug)]
 pub(super) struct Worth {
     pub undetermined: usize,
@@ -76,8 +78,8 @@ impl Offer<'_> {
         (self.worth)(&sum)
     }
 
-    /// Per measure the best choices by growing size; of equal size in tests and sensors the best one, and only what smaller
-    /// choices do not reach.
+    /// Per measure the best choices by growing size; of equal size in tests and sensors the best one, and only what
+    /// smaller choices do not reach.
     pub fn best(&self, measures: usize) -> Vec<Vec<Chosen>> {
         let (tests, sensors) = (self.information.len(), self.information.first().map_or(0, Vec::len));
         let exact = tests + sensors < usize::BITS as usize && 1usize << (tests + sensors) <= COUNTABLE;
@@ -104,7 +106,8 @@ impl Offer<'_> {
         choices.into_par_iter().map(|choice| (choice.clone(), self.worth_of(&choice))).collect()
     }
 
-    /// For one to three tests the sensors one after the other, each time the one that helps most, then exchanged as long as that helps.
+    /// For one to three tests the sensors one after the other, each time the one that helps most, then exchanged as
+    /// long as that helps.
     fn grown(&self, measure: usize, tests: usize, sensors: usize) -> Vec<(Choice, (usize, f64))> {
         let everything: Vec<usize> = (0..sensors).collect();
         let mut found = Vec::new();

@@ -25,7 +25,8 @@ const HARDLY_DETERMINED: f64 = 0.25;
 const HELD: f64 = 1e4;
 /// Deviations that fall below this share of what they were are worth a word.
 const NOTABLY: f64 = 0.9;
-/// The useful band holds this share of the power of all sensitivities; samples should come ten times as fast as its end.
+/// The useful band holds this share of the power of all sensitivities; samples should come ten times as fast as its
+/// end.
 const BAND_SHARE: f64 = 0.99;
 const SAMPLES_PER_PERIOD: f64 = 10.0;
 

@@ -8,7 +8,8 @@ use crate::study::ErrorDefinition;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Share of the residual's power that its own past may predict before process noise (or a structural error) is suspected.
+/// Share of the residual's power that its own past may predict before process noise (or a structural error) is
+/// suspected.
 const PREDICTED: f64 = 0.2;
 /// Growth of the sensitivities over a record from which on a free simulation is doubtful.
 const GROWTH: f64 = 20.0;

@@ -1,8 +1,8 @@
 //! Equation error: measured states put into the equations of motion, which are linear in many parameters.
 //!
-//! The equations are taken in their weak form: multiplied with smooth test functions of limited length and integrated by
-//! parts, so that no rate has to be differentiated from samples (Shinbrot-1957). Noise in the states biases the result; it is a
-//! start for the other definitions, or an answer where the measurements are very clean.
+//! The equations are taken in their weak form: multiplied with smooth test functions of limited length and integrated
+//! by parts, so that no rate has to be differentiated from samples (Shinbrot-1957). Noise in the states biases the
+//! result; it is a start for the other definitions, or an answer where the measurements are very clean.
 
 use super::super::fitting::{bounds, prior_rows};
 use crate::diagnostics::{Code, Diagnostic};
@@ -31,8 +31,9 @@ pub struct EquationFit {
     pub steps: usize,
 }
 
-/// Parameters by equation error, from `start` where the equations are not linear in them. The study's priors count beside the
-/// equations as further rows, which are then weighted by their own scatter about a first solution without priors.
+/// Parameters by equation error, from `start` where the equations are not linear in them. The study's priors count
+/// beside the equations as further rows, which are then weighted by their own scatter about a first solution without
+/// priors.
 ///
 /// # Errors
 /// Why the definition does not fit: states that are not measured, loops, records without a start.
@@ -74,8 +75,8 @@ pub(super) fn unmeasured(compiled: &Compiled, records: &[&Record], theta: &[f64]
     records.iter().find_map(|record| measured_states(compiled, record, theta).err())
 }
 
-/// Per state its course at the compared samples, from the channels that are linear in the states alone; velocities that are
-/// not measured are the derivatives of their positions.
+/// Per state its course at the compared samples, from the channels that are linear in the states alone; velocities that
+/// are not measured are the derivatives of their positions.
 fn measured_states(compiled: &Compiled, record: &Record, theta: &[f64]) -> Result<Vec<Vec<f64>>, String> {
     let variables = compiled.model.variables();
     let (n, samples) = (variables.len(), record.sample_count());
@@ -195,8 +196,8 @@ impl Equations<'_> {
         (residual, gradient)
     }
 
-    /// Scales every state's equation to residuals of variance one, by `residual` at a solution with `fitted` parameters. Windows
-    /// overlap: rows count as many as are independent.
+    /// Scales every state's equation to residuals of variance one, by `residual` at a solution with `fitted`
+    /// parameters. Windows overlap: rows count as many as are independent.
     fn weigh(&mut self, residual: &[f64], fitted: usize) {
         let freedom = (residual.len() as f64 / (residual.len().saturating_sub(fitted)).max(1) as f64).sqrt();
         let used: Vec<usize> = (0..self.scales.len()).filter(|&i| self.scales[i] > 0.0).collect();

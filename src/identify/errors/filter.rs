@@ -1,7 +1,7 @@
 //! Filter error: the parameters whose one-step predictions by an extended Kalman filter are best (Jategaonkar-2015).
 //!
-//! Gains and weights are frozen while the parameters move, then renewed with the noise levels of largest likelihood, until
-//! neither changes: at the end the innovations are white and the weights their inverse deviations.
+//! Gains and weights are frozen while the parameters move, then renewed with the noise levels of largest likelihood,
+//! until neither changes: at the end the innovations are white and the weights their inverse deviations.
 
 use super::super::fitting::Fitted;
 use super::kalman::{NoiseLevels, Pass, pass};

@@ -50,7 +50,8 @@ pub fn pass(compiled: &Compiled, record: &Record, theta: &[f64], noise: &NoiseLe
     if record.first > 0 {
         let lead = stretches.advance(&state, 0, record.first, true)?;
         for transition in &lead.transitions {
-            // Transitions of a longer stretch refer to its first state: one step of the noise is enough of an estimate here.
+            // Transitions of a longer stretch refer to its first state: one step of the noise is enough of an estimate
+            // here.
             covariance = predicted(&vec![0.0; n * n], transition, &noise.process, step * record.first as f64);
         }
         state.y.clone_from(&lead.states[record.first - 1].y);
@@ -166,7 +167,8 @@ pub(super) fn add_product(target: &mut [f64], a: &[f64], x: &[f64]) {
     }
 }
 
-/// Inverse of the lower Cholesky factor (column-major) and the logarithm of the determinant; `None` unless positive definite.
+/// Inverse of the lower Cholesky factor (column-major) and the logarithm of the determinant; `None` unless positive
+/// definite.
 fn whitening(m: usize, matrix: &[f64]) -> Option<(Vec<f64>, f64)> {
     let mut lower = vec![0.0_f64; m * m];
     let mut log_determinant = 0.0;

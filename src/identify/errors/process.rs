@@ -22,8 +22,8 @@ pub(super) fn driven(compiled: &Compiled) -> Vec<usize> {
     if velocities.is_empty() { kind(VariableKind::Law) } else { velocities }
 }
 
-/// The levels with the largest likelihood on the filter's linearisation `passes` (made with `noise`); measurement noise that the
-/// study states stays.
+/// The levels with the largest likelihood on the filter's linearisation `passes` (made with `noise`); measurement noise
+/// that the study states stays.
 pub(super) fn estimate(compiled: &Compiled, records: &[&Record], passes: &[Pass], noise: &NoiseLevels) -> NoiseLevels {
     let states = driven(compiled);
     let compared = |measure: usize| records.iter().any(|record| record.measures.contains(&measure));
@@ -124,8 +124,8 @@ impl Likelihood<'_> {
     }
 }
 
-/// Levels to begin with: measurement noise a hundredth of each channel's deviation (or as stated), process noise that moves a
-/// velocity by a tenth of its course over the record.
+/// Levels to begin with: measurement noise a hundredth of each channel's deviation (or as stated), process noise that
+/// moves a velocity by a tenth of its course over the record.
 pub(super) fn first_levels(compiled: &Compiled, records: &[&Record], courses: &[f64]) -> NoiseLevels {
     let duration: f64 = records.iter().map(|record| record.sample_step() * record.sample_count() as f64).sum();
     let mut process = vec![0.0; compiled.model.variables().len()];

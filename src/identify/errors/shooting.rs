@@ -1,8 +1,8 @@
 //! Multiple shooting (method 3.5; Bock-1983): stretches with start states of their own, which the fit joins.
 //!
-//! A free simulation over a whole record forgets its start (self-excited, chaotic) or swings out of step (weakly damped), and its
-//! cost has minima everywhere. Stretches start near the measured states; the conditions that join them are rows whose weight
-//! grows until no gap is left. From there the output error of the free simulation goes on.
+//! A free simulation over a whole record forgets its start (self-excited, chaotic) or swings out of step (weakly
+//! damped), and its cost has minima everywhere. Stretches start near the measured states; the conditions that join them
+//! are rows whose weight grows until no gap is left. From there the output error of the free simulation goes on.
 
 use super::filter::courses;
 use super::kalman::pass;
@@ -29,7 +29,8 @@ pub struct Joined {
     pub failures: usize,
 }
 
-/// Parameters (and states between stretches) by multiple shooting with `stretches` stretches per record; weights and filters as of
+/// Parameters (and states between stretches) by multiple shooting with `stretches` stretches per record; weights and
+/// filters as of
 /// `problem`. `refine` turns the parameters' part of an observer's view away.
 ///
 /// # Errors
@@ -91,7 +92,8 @@ pub fn shooting(
     })
 }
 
-/// Typical course of every state: of a free simulation where it succeeds, of the filter's estimates where those are larger.
+/// Typical course of every state: of a free simulation where it succeeds, of the filter's estimates where those are
+/// larger.
 fn measured_courses(compiled: &Compiled, records: &[&Record], theta: &[f64]) -> Result<Vec<f64>, String> {
     let typical: Vec<f64> = compiled.model.variables().iter().map(|variable| variable.scale).collect();
     let free = courses(compiled, records, theta).unwrap_or_else(|_| typical.clone());

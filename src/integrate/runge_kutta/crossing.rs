@@ -96,7 +96,8 @@ impl RungeKutta {
         (!is_close).then_some(share)
     }
 
-    /// Difference of the right-hand side on the sides held and on those by the values at the end of an attempt, as an error.
+    /// Difference of the right-hand side on the sides held and on those by the values at the end of an attempt, as an
+    /// error.
     fn jump(&mut self, system: &mut Augmented, h: f64, held: &Arc<[bool]>) -> f64 {
         self.set_branches(system, Branches::Free);
         system.rates(self.time + h, &self.candidate, &mut self.error);
@@ -141,8 +142,8 @@ impl RungeKutta {
         }
     }
 
-    /// A kink that the next step, of length `h`, will probably cross, located by a step of the state alone: sensitivities follow once
-    /// its length is known.
+    /// A kink that the next step, of length `h`, will probably cross, located by a step of the state alone:
+    /// sensitivities follow once its length is known.
     pub(super) fn look_ahead(&mut self, system: &mut Augmented, h: f64) -> Option<Aim> {
         let Branches::Held(sides) = &self.branches else { return None };
         if !self.kinks.expects_crossing(h, sides) {

@@ -23,7 +23,8 @@ pub fn envelope(values: &[f64], size: usize) -> Vec<f64> {
     kept
 }
 
-/// Median of `y` in `bins` equally wide bins of `x`: (bin centre, median), bins with fewer than `least` points left out.
+/// Median of `y` in `bins` equally wide bins of `x`: (bin centre, median), bins with fewer than `least` points left
+/// out.
 pub fn median_by_bin(x: &[f64], y: &[f64], bins: usize, least: usize) -> Vec<(f64, f64)> {
     let finite: Vec<(f64, f64)> =
         x.iter().copied().zip(y.iter().copied()).filter(|(x, y)| x.is_finite() && y.is_finite()).collect();

@@ -76,8 +76,8 @@ pub fn view(fit: &Identification) -> Option<CertaintyView> {
     })
 }
 
-/// The joint region of two parameters, from the F distribution with two degrees of freedom above; its box are the intervals of one
-/// parameter each.
+/// The joint region of two parameters, from the F distribution with two degrees of freedom above; its box are the
+/// intervals of one parameter each.
 fn ellipse(fit: &Identification, i: usize, j: usize) -> String {
     let (x, y) = (&fit.parameters[i], &fit.parameters[j]);
     let deviations = (x.standard_deviation.unwrap_or(0.0), y.standard_deviation.unwrap_or(0.0));

@@ -167,8 +167,8 @@ fn excitation(excitation: &Excitation) -> ExcitationView {
     }
 }
 
-/// Bars: identifiability and relative deviation, both as square roots, so that small ones show. The second is full at 100 % of the value;
-/// what is undetermined has none.
+/// Bars: identifiability and relative deviation, both as square roots, so that small ones show. The second is full at
+/// 100 % of the value; what is undetermined has none.
 fn parameters(outcome: &Outcome) -> Vec<ParameterView> {
     let relative = |k: usize| {
         let parameter = &outcome.parameters[k];

@@ -9,7 +9,8 @@ const PADDING_DECAY: f64 = 1e-3;
 /// backward (zero phase, amplitude response squared).
 ///
 /// The ends are extended by point reflection and the filter starts in the steady state of the first extended sample, so
-/// that constants pass unchanged, and lines but for a remainder of transients (Gustafsson-1996; the convention of SciPy's
+/// that constants pass unchanged, and lines but for a remainder of transients (Gustafsson-1996; the convention of
+/// SciPy's
 /// `sosfiltfilt`, with a padding that lets transients decay to a thousandth).
 /// Applied to the residual it must be applied to every gradient column as well.
 #[derive(Clone, Debug, PartialEq)]

@@ -65,7 +65,8 @@ impl Table {
             .at(None, Some(name))
     }
 
-    /// All samples of a column in SI. `unit` is the unit of the quantity in the study; the file's own unit is converted.
+    /// All samples of a column in SI. `unit` is the unit of the quantity in the study; the file's own unit is
+    /// converted.
     ///
     /// # Errors
     /// No such column; a cell that is no finite number; a unit that is unknown, missing or of another kind.

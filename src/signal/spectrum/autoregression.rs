@@ -44,8 +44,8 @@ impl AutoRegression {
         Self::from_ladder(ladder)
     }
 
-    /// The predictor of a process with this autocovariance (lags 0 ..= order), by Levinson's recursion; a lower order where the
-    /// process is predicted perfectly.
+    /// The predictor of a process with this autocovariance (lags 0 ..= order), by Levinson's recursion; a lower order
+    /// where the process is predicted perfectly.
     pub fn from_autocovariance(autocovariance: &[f64]) -> Self {
         let mut ladder = vec![(Vec::new(), autocovariance.first().copied().unwrap_or(1.0))];
         for m in 1..autocovariance.len() {
@@ -80,8 +80,9 @@ impl AutoRegression {
         self.coefficients.len()
     }
 
-    /// Replaces a column by its prediction errors: the noise of this model becomes white with [`AutoRegression::variance`],
-    /// from the first sample on (lower orders predict the first samples). Linear: apply it to gradient columns too.
+    /// Replaces a column by its prediction errors: the noise of this model becomes white with
+    /// [`AutoRegression::variance`], from the first sample on (lower orders predict the first samples). Linear: apply
+    /// it to gradient columns too.
     pub fn whiten(&self, column: &mut [f64]) {
         for t in (0..column.len()).rev() {
             let (predictor, relative_variance) = &self.predictors[t.min(self.order())];
@@ -90,8 +91,8 @@ impl AutoRegression {
         }
     }
 
-    /// The column shaped by the model, backward in time and with the decaying rest before its first sample, such that scalar
-    /// products of shaped columns are `x^T R y` with R the covariance matrix of the process.
+    /// The column shaped by the model, backward in time and with the decaying rest before its first sample, such that
+    /// scalar products of shaped columns are `x^T R y` with R the covariance matrix of the process.
     pub fn colour(&self, column: &[f64]) -> Vec<f64> {
         let deviation = self.variance.max(0.0).sqrt();
         if self.coefficients.is_empty() {

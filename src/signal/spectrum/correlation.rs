@@ -49,8 +49,8 @@ pub fn ljung_box(samples: &[f64], lags: usize, fitted: usize) -> (f64, f64) {
 /// Number of independent samples with the same information on the variance: N / (1 + 2 sum rho_k^2), the equivalent
 /// degrees of freedom of a coloured residual (Bartlett-1946; for a signal that fills the share B of the band: N B).
 ///
-/// Squares of estimated correlations are about 1/(this number) too large each, which is taken off; lags run to a quarter
-/// of the record. The result lies in 1 ..= N.
+/// Squares of estimated correlations are about 1/(this number) too large each, which is taken off; lags run to a
+/// quarter of the record. The result lies in 1 ..= N.
 pub fn effective_count(samples: &[f64]) -> f64 {
     let count = samples.len();
     if count < 4 {

@@ -105,8 +105,8 @@ pub struct Experiment {
     pub time_column: String,
     /// (input or measure name, column name) where they differ.
     pub columns: Vec<(String, String)>,
-    /// Inputs (index into [`Study::inputs`](super::Study::inputs), value in SI) that the record does not hold and that the experiment states
-    /// as constant: `inputs = { pulse = 0 V }`. Every other input needs its column.
+    /// Inputs (index into [`Study::inputs`](super::Study::inputs), value in SI) that the record does not hold and that
+    /// the experiment states as constant: `inputs = { pulse = 0 V }`. Every other input needs its column.
     pub constant_inputs: Vec<(usize, f64)>,
     /// Indices of the measures compared in this experiment (default: all).
     pub measures: Vec<usize>,
@@ -178,7 +178,8 @@ impl Statistic {
 }
 
 impl Study {
-    /// How simulations start, experiments first, then manoeuvres: (what it is, start, place). Simulations refer to this order.
+    /// How simulations start, experiments first, then manoeuvres: (what it is, start, place). Simulations refer to this
+    /// order.
     pub fn starts(&self) -> impl Iterator<Item = (String, &Start, Span)> {
         let experiments = self.experiments.iter().map(|e| (format!("experiment `{}`", e.name), &e.start, e.span));
         experiments.chain(self.manoeuvres.iter().map(|m| (format!("manoeuvre `{}`", m.name), &m.start, m.span)))

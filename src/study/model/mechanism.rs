@@ -100,7 +100,8 @@ impl AxisMotion {
     }
 }
 
-/// Symbols of a free rotation: quaternion (scalar first), relative angular velocity and its derivative in the turned axes.
+/// Symbols of a free rotation: quaternion (scalar first), relative angular velocity and its derivative in the turned
+/// axes.
 #[derive(Clone, Copy, Debug)]
 pub struct RotationSymbols {
     pub quaternion: [Symbol; 4],
@@ -122,7 +123,8 @@ pub struct JointSymbols {
 #[derive(Clone, Debug)]
 pub struct Coupling {
     pub name: String,
-    /// Left side minus right side, in terms of positions of joint axes, modes and points, elongations, time, inputs, parameters.
+    /// Left side minus right side, in terms of positions of joint axes, modes and points, elongations, time, inputs,
+    /// parameters.
     pub difference: Node,
     /// Of both sides.
     pub dimension: Dimension,
@@ -176,7 +178,8 @@ pub struct Force {
 pub enum ForcePlace {
     /// Along or about one axis of a joint; elongation = the axis' coordinate.
     Joint { joint: usize, axis: usize },
-    /// Between two points. With `along`, see [`ForceDirection`]. Without, the elongation is the distance of the points minus
+    /// Between two points. With `along`, see [`ForceDirection`]. Without, the elongation is the distance of the points
+    /// minus
     /// `free_length`.
     Between { first: Attachment, second: Attachment, along: Option<ForceDirection>, free_length: Option<Node> },
 }
@@ -256,6 +259,7 @@ impl EventTrigger {
 pub enum ChangeTarget {
     /// State of a law.
     State(Symbol),
-    /// Rate of a force element (index in [`Study::forces`](super::Study::forces)), changed by an impulse along the element.
+    /// Rate of a force element (index in [`Study::forces`](super::Study::forces)), changed by an impulse along the
+    /// element.
     Rate(usize),
 }

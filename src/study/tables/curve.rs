@@ -32,8 +32,8 @@ fn secant(pair: &[(f64, f64)]) -> f64 {
     (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0)
 }
 
-/// Means of the neighbouring secants, reduced until no piece overshoots: the slopes of a piece, in units of its secant, stay
-/// within the circle of radius 3.
+/// Means of the neighbouring secants, reduced until no piece overshoots: the slopes of a piece, in units of its secant,
+/// stay within the circle of radius 3.
 fn monotone_slopes(points: &[(f64, f64)]) -> Vec<f64> {
     let secants: Vec<f64> = points.windows(2).map(secant).collect();
     let last = secants.len() - 1;

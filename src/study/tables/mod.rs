@@ -1,7 +1,8 @@
 //! Tables: characteristic curves as functions of one argument, and surfaces over two, lowered to expressions.
 //!
-//! *In*: declarations with points in the text or in a file. *Out*: curves as data of the graph; of surfaces choices between
-//! polynomials over a balanced tree, so that derivatives follow. *Must not happen here*: reading of files (they are loaded with the study).
+//! *In*: declarations with points in the text or in a file. *Out*: curves as data of the graph; of surfaces choices
+//! between polynomials over a balanced tree, so that derivatives follow. *Must not happen here*: reading of files (they
+//! are loaded with the study).
 
 mod curve;
 mod file;

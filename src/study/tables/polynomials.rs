@@ -2,8 +2,8 @@
 
 use crate::expression::{Beyond, Binary, Graph, Node};
 
-/// A function of one argument: pieces in powers of the distance from where each begins, whose coefficients may be functions of
-/// another argument. `arguments` has one more entry.
+/// A function of one argument: pieces in powers of the distance from where each begins, whose coefficients may be
+/// functions of another argument. `arguments` has one more entry.
 pub(super) struct Piecewise<'p> {
     pub arguments: &'p [f64],
     pub pieces: &'p [[Node; 4]],

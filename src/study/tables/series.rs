@@ -139,8 +139,8 @@ impl<'a> Checker<'a> {
         self.fail(diagnostic, SCOPE)
     }
 
-    /// Harmonics with the power of the one-sided density over the wavenumber (rad per unit of the argument) in bands of equal
-    /// width on a logarithmic scale, each at the geometric middle of its band, phases by chance.
+    /// Harmonics with the power of the one-sided density over the wavenumber (rad per unit of the argument) in bands of
+    /// equal width on a logarithmic scale, each at the geometric middle of its band, phases by chance.
     fn spectrum(
         &mut self,
         table: &'a TableDeclaration,

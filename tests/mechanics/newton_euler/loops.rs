@@ -91,8 +91,8 @@ fn bennett_linkage_moves_and_names_what_is_redundant() {
     );
 }
 
-/// Driven or let go it turns all round, although no two constraints of its closing hinge are independent everywhere. Half angles of
-/// neighbouring hinges have a constant product of tangents, opposite hinges the opposite angle.
+/// Driven or let go it turns all round, although no two constraints of its closing hinge are independent everywhere.
+/// Half angles of neighbouring hinges have a constant product of tangents, opposite hinges the opposite angle.
 #[test]
 fn bennett_linkage_turns_all_round() {
     let (alpha, beta) = (30.0_f64.to_radians(), (0.8 * 0.5_f64).asin());

@@ -1,8 +1,8 @@
-//! Mechanisms of every kind of joint, with and without loops, against Newton and Euler in absolute coordinates: at every sample of
-//! a motion the bodies' accelerations balance gravity, elements and reactions, reactions do on the freedom of their joints what
-//! elements there do, the joints' coordinates put the child where it is, prescribed ones are what they shall be, and accelerations
-//! are the derivatives of velocities. Together these
-//! determine the motion and all reactions; nothing of the product's formalism is used.
+//! Mechanisms of every kind of joint, with and without loops, against Newton and Euler in absolute coordinates: at
+//! every sample of a motion the bodies' accelerations balance gravity, elements and reactions, reactions do on the
+//! freedom of their joints what elements there do, the joints' coordinates put the child where it is, prescribed ones
+//! are what they shall be, and accelerations are the derivatives of velocities. Together these determine the motion and
+//! all reactions; nothing of the product's formalism is used.
 
 mod closing;
 mod loops;
@@ -198,8 +198,8 @@ impl Mechanism {
         self.channels[&path.replace('.', "_")][k]
     }
 
-    /// How far a joint is from its definition (m, 1), and what its reaction does on its free motions beside the elements
-    /// there (N, N m).
+    /// How far a joint is from its definition (m, 1), and what its reaction does on its free motions beside the
+    /// elements there (N, N m).
     pub fn joint(&self, joint: &Joint, k: usize) -> (f64, f64) {
         let ((parent, at_parent), (child, at_child)) = (self.end(&joint.parent, k), self.end(&joint.child, k));
         let (force, moment) = self.reaction(joint, k);
