@@ -1,6 +1,6 @@
 //! Orthonormal basis of a column span, and projection onto its complement.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 /// Columns whose norm falls below this share of the largest, after the others were taken out, do not count.
 const RANK_TOLERANCE: f64 = 1e-9;
@@ -75,9 +75,18 @@ pub fn least_squares(columns: &[f64], rows: usize, target: &[f64]) -> Option<Vec
     Some(solution.iter().zip(&norms).map(|(x, &norm)| if norm > 0.0 { x / norm } else { 0.0 }).collect())
 }
 
+/// Two unit vectors that are perpendicular to a direction in space and to each other.
+pub fn perpendicular(direction: [f64; 3]) -> [[f64; 3]; 2] {
+    let direction = Vector3::from(direction);
+    let mut helper = Vector3::zeros();
+    helper[direction.iamin()] = 1.0;
+    let first = direction.cross(&helper).normalize();
+    [first, direction.cross(&first).normalize()].map(Into::into)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Basis, least_squares};
+    use super::{Basis, least_squares, perpendicular};
 
     #[test]
     fn nothing_is_fitted_by_no_columns() {
@@ -120,5 +129,17 @@ mod tests {
         let target: Vec<f64> = a.iter().zip(&b).map(|(x, y)| 3.0 * x - 2e-7 * y).collect();
         let solution = least_squares(&[a, b].concat(), 4, &target).expect("finite");
         assert!((solution[0] - 3.0).abs() < 1e-12 && (solution[1] + 2e-7).abs() < 1e-18, "{solution:?}");
+    }
+
+    #[test]
+    fn perpendicular_directions() {
+        for direction in [[0.0, 0.0, 1.0], [3.0, 0.0, 4.0], [-0.3, 2.0, 0.1]] {
+            let [a, b] = perpendicular(direction);
+            let product = |x: [f64; 3], y: [f64; 3]| (0..3).map(|i| x[i] * y[i]).sum::<f64>();
+            for value in [product(a, direction), product(b, direction), product(a, b)] {
+                assert!(value.abs() < 1e-15, "{direction:?}: {a:?}, {b:?}");
+            }
+            assert!((product(a, a) - 1.0).abs() < 1e-15 && (product(b, b) - 1.0).abs() < 1e-15);
+        }
     }
 }

@@ -10,7 +10,7 @@ mod regularised;
 mod sparse_lu;
 mod svd;
 
-pub use basis::{Basis, least_squares};
+pub use basis::{Basis, least_squares, perpendicular};
 pub use factorisation::{Factorisation, SingularMatrix};
 pub use pattern::SparsityPattern;
 pub use products::{RowOrder, combine};

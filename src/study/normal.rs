@@ -5,9 +5,9 @@ use super::evaluate::Typed;
 use super::model::{AxisMotion, ReactionQuantity};
 use crate::diagnostics::{Code, Diagnostic, Span};
 use crate::expression::{Node, Unary};
+use crate::linear::perpendicular;
 use crate::quantities::Dimension;
 use crate::syntax::{ElementPlace, Name};
-use nalgebra::Vector3;
 
 impl<'a> Checker<'a> {
     /// What presses the sides of a joint on each other, for effects that rub there: the size of the force that it
@@ -54,11 +54,7 @@ impl<'a> Checker<'a> {
         if read.freedom.rotation.is_some() || is_turned {
             return None;
         }
-        let axis = Vector3::from(axis);
-        let mut helper = Vector3::zeros();
-        helper[axis.iamin()] = 1.0;
-        let first = axis.cross(&helper).normalize();
-        Some(vec![first.into(), axis.cross(&first).normalize().into()])
+        Some(perpendicular(axis).to_vec())
     }
 
     fn reaction_component(&mut self, joint: usize, owner: &str, axis: usize, span: Span) -> Node {
