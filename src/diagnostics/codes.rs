@@ -361,13 +361,15 @@ codes! {
      Positions follow from rates; ports and parameters are given from outside.\n\
      Declare a state and change that: `state z: coordinate from 0 m`, `when x < 0 m { z := x }`.\n"
 
-    COUPLING "E0263" "coupling of other things than positions"
+    COUPLING "E0263" "coupling of other things than positions or rates"
     "A coupling is an equation between positions that holds at all times: positions of joints and points, elongations, modes, numbers,\n\
-     parameters, inputs and the time. What follows from velocities, loads or states of laws is no part of it - slip, friction and\n\
-     elasticity are force elements - and without any position there is nothing to couple.\n\
+     parameters, inputs and the time. Or it is one between their rates, each with a factor that depends on positions at most:\n\
+     rolling without slip. What follows from loads or states of laws is no part of it - slip, friction and elasticity are force\n\
+     elements - and where nothing moves there is nothing to couple.\n\
      \n\
      \x20   coupling gears: motor.position = 4.5 * wheel.position\n\
-     \x20   coupling spindle: carriage.position = 5 mm / (2 * pi) * screw.position\n"
+     \x20   coupling spindle: carriage.position = 5 mm / (2 * pi) * screw.position\n\
+     \x20   coupling rolling: wheel.velocity.x = radius * axle.velocity\n"
 
     // ---- E03xx: mechanics ----
 

@@ -70,9 +70,10 @@ struct Stage {
 }
 
 /// Splits the constraints into those on positions and those on velocities. Components whose rates hold common
-/// multipliers form a class; constraints that touch a single class come first and settle it, the others follow.
-/// Velocities may have constraints of their own, those of linear couplings, but of constraints that touch positions,
-/// too, positions have more of their own.
+/// multipliers form a class; constraints that touch a single class come first and settle it, if they are as many as its
+/// multipliers: velocities may have constraints of their own, those of linear couplings and of rolling, but others that
+/// touch positions, too, and follow. Components whose rates hold no multiplier stay beside others: the heading of a wheel
+/// that rolls decides on velocities, not they on it.
 fn stages(system: &mut Augmented, t: f64, y: &[f64], fixed: &[bool]) -> Vec<Stage> {
     let n = system.n;
     let by_y = entries(system.dynamics, t, y, &vec![0.0; n]).by_y;
@@ -83,11 +84,17 @@ fn stages(system: &mut Augmented, t: f64, y: &[f64], fixed: &[bool]) -> Vec<Stag
         let (a, b) = (find(&mut class, row), find(&mut class, column));
         class[a] = b;
     }
-    let touched: Vec<(usize, Vec<usize>)> = structure
-        .constraints
-        .iter()
-        .map(|&row| (row, by_y.iter().filter(|entry| entry.0 == row).map(|entry| entry.1).collect()))
-        .collect();
+    let mut multipliers = vec![0; n];
+    for i in (0..n).filter(|&i| structure.is_multiplier[i]) {
+        multipliers[find(&mut class, i)] += 1;
+    }
+    let is_held: Vec<bool> = (0..n).map(|i| multipliers[find(&mut class, i)] > 0).collect();
+    let touched = |row: usize| {
+        let all: Vec<usize> = by_y.iter().filter(|entry| entry.0 == row).map(|entry| entry.1).collect();
+        let any_held = all.iter().any(|&i| is_held[i]);
+        (row, all.into_iter().filter(|&i| is_held[i] || !any_held).collect())
+    };
+    let touched: Vec<(usize, Vec<usize>)> = structure.constraints.iter().map(|&row| touched(row)).collect();
     let mut first = Stage::default();
     let mut second = Stage::default();
     let mut settled = vec![false; n];
@@ -99,9 +106,7 @@ fn stages(system: &mut Augmented, t: f64, y: &[f64], fixed: &[bool]) -> Vec<Stag
     };
     let classes: Vec<Vec<usize>> = touched.iter().map(|(_, columns)| classes_of(columns)).collect();
     let own = |c: usize| classes.iter().filter(|classes| classes[..] == [c]).count();
-    let follows = |c: usize| {
-        classes.iter().any(|classes| classes.contains(&c) && classes.iter().any(|&other| own(other) > own(c)))
-    };
+    let follows = |c: usize| own(c) < multipliers[c];
     for ((row, _), classes) in touched.iter().zip(&classes) {
         match classes[..] {
             [single] if !follows(single) => {

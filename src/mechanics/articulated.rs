@@ -1,5 +1,6 @@
 //! Accelerations by the articulated-body algorithm on expressions (Featherstone-2008, table 7.1).
 
+use super::forces::Effect;
 use super::kinematics::{FrameMotion, SpatialMotion, carry, motion_axis};
 use super::modal_pass::{Modes, Reduced};
 use super::topology::{Coordinate, Link, Seat, Tree};
@@ -72,6 +73,19 @@ impl Loads {
     pub fn none(graph: &mut Graph, tree: &Tree) -> Self {
         let coordinates = vec![graph.constant(0.0); tree.links.len()];
         Self { coordinates, wrenches: tree.links.iter().map(|_| Wrench::zero(graph)).collect() }
+    }
+
+    /// Adds `load` times what load 1 does.
+    pub fn act(&mut self, graph: &mut Graph, effect: &Effect, load: Node) {
+        match effect {
+            Effect::Coordinate(link) => self.coordinates[*link] = graph.add(self.coordinates[*link], load),
+            Effect::Links(unit) => {
+                for &(link, wrench) in unit {
+                    let wrench = wrench.scale(graph, load);
+                    self.wrenches[link] = self.wrenches[link].add(graph, wrench);
+                }
+            }
+        }
     }
 }
 

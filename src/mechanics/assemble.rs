@@ -68,6 +68,7 @@ pub(super) fn assemble(
         constraints,
         constraint_names,
         loop_constraints: loops.multipliers.len(),
+        position_constraints: loops.of_positions(),
         loop_owners: loops.owners(study),
         warnings: loops.warnings,
         parameters: study.parameters.iter().map(|p| p.symbol).collect(),

@@ -1,6 +1,6 @@
 //! Can the loops be closed, and which of their constraints say something new? Answered near every start of the study.
 
-use super::linkage::{Linkage, OtherPosition};
+use super::linkage::{CLOSED, Linkage, OtherPosition};
 use super::loops::{Direction, Owner, Row};
 use super::selection::{Group, Jacobian, groups};
 use super::topology::Tree;
@@ -28,8 +28,8 @@ pub(super) struct Assembly {
 /// A row whose part independent of the rows before is smaller than this, relative to the row, is redundant.
 const INDEPENDENT: f64 = 1e-7;
 
-/// The constraints as expressions: positions and velocities per row, cosines that are positive where no joint is turned
-/// over.
+/// The constraints as expressions: positions of the first rows, velocities of all, cosines that are positive where no
+/// joint is turned over.
 pub(super) struct Constraints<'a> {
     pub rows: &'a [Row],
     pub positions: &'a [Node],
@@ -96,7 +96,7 @@ pub(super) fn assemble_loops(
 /// Mechanisms of more freedoms keep the constraints that are independent near their start.
 const MOST_FREEDOMS: usize = 30;
 
-/// Groups of rows of which different ones are independent in different positions.
+/// Groups of rows on positions of which different ones are independent in different positions.
 fn changing(
     linkage: &mut Linkage,
     is_driven: bool,
@@ -108,13 +108,15 @@ fn changing(
     let m = jacobian.len() / n.max(1);
     let largest = jacobian.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
     let says_nothing = |row: usize| (0..n).all(|j| jacobian[j * m + row].abs() < 1e-9 * largest);
-    let is_spatial = (0..m).any(|row| !kept.contains(&row) && !says_nothing(row));
+    let of_positions = linkage.of_positions();
+    let kept: Vec<usize> = kept.iter().copied().filter(|row| *row < of_positions).collect();
+    let is_spatial = (0..of_positions).any(|row| !kept.contains(&row) && !says_nothing(row));
     if !is_spatial || n == 0 || n > MOST_FREEDOMS {
         return vec![];
     }
     let along = linkage.jacobians_along(general, is_driven);
     let starts: Vec<Vec<f64>> = starts.iter().map(|closed| linkage.jacobian_at(closed)).collect();
-    groups(kept, &all(m, &along), &all(m, &starts))
+    groups(&kept, &all(of_positions, &along), &all(of_positions, &starts))
 }
 
 fn all(rows: usize, jacobians: &[Vec<f64>]) -> Vec<Jacobian<'_>> {
@@ -160,7 +162,8 @@ fn other_position(study: &Study, other: &OtherPosition) -> Diagnostic {
         .help(format!("say it in the start: `start = rest {{ {path} = {chosen} }}`"))
 }
 
-/// Gram-Schmidt over the rows, shifts before turns: a mechanism loses turning constraints first, after couplings.
+/// Gram-Schmidt over the rows, shifts before turns: a mechanism loses turning constraints first, after couplings, those
+/// of rates before all.
 fn independent_rows(jacobian: &[f64], rows: &[Row]) -> Vec<usize> {
     let (m, n) = (rows.len(), jacobian.len() / rows.len().max(1));
     let row = |i: usize| -> Vec<f64> { (0..n).map(|j| jacobian[j * m + i]).collect() };
@@ -169,7 +172,8 @@ fn independent_rows(jacobian: &[f64], rows: &[Row]) -> Vec<usize> {
     order.sort_by_key(|&i| match rows[i].direction {
         Direction::Shift(_) | Direction::Distance => 0,
         Direction::Turn(_) => 1,
-        Direction::Relation(_) => 2,
+        Direction::Relation(_) if rows[i].has_position() => 2,
+        Direction::Relation(_) => 3,
     });
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut kept = Vec::new();
@@ -198,6 +202,7 @@ fn not_closed(study: &Study, rows: &[Row], residual: &[f64]) -> Diagnostic {
     let worst = (0..rows.len()).max_by(|&a, &b| residual[a].abs().total_cmp(&residual[b].abs())).unwrap_or(0);
     let owner = rows[worst].owner;
     let gap = match rows[worst].direction {
+        _ if residual[worst].abs() < CLOSED => "closes only with its parts turned over".to_owned(),
         Direction::Turn(_) => format!("{:.3} deg are left ({})", residual[worst].to_degrees(), rows[worst].holds),
         Direction::Relation(dimension) => format!("{} are left between its sides", amount(dimension, residual[worst])),
         _ => format!("{:.4} mm are left ({})", residual[worst] * 1e3, rows[worst].holds),

@@ -3,9 +3,10 @@
 use super::articulated::{self, Accelerated, Inertia, Loads};
 use super::assemble::{assemble, quaternion_rates};
 use super::closing::{closing_coordinate, closing_rotation};
+use super::couplings::Places;
 use super::elastic::refuse_large_modes;
 use super::events;
-use super::forces::{self, Effect, ForceGeometry};
+use super::forces::{self, ForceGeometry};
 use super::inertia::refuse_missing_inertia;
 use super::kinematics::{self, FrameMotion, SpatialMotion};
 use super::multipliers::Loops;
@@ -38,7 +39,8 @@ pub fn derive(study: &Study) -> Result<System, Vec<Diagnostic>> {
 
     let geometries = force_geometries(&mut graph, study, &tree, &frames)?;
     let mut meaning = kinematic_meaning(&mut graph, study, &tree, &frames, &inertias, &geometries);
-    let loops = Loops::close(&mut graph, study, &tree, &frames, &meaning)?;
+    let places = Places { study, tree: &tree, frames: &frames, geometries: &geometries, meaning: &meaning };
+    let loops = Loops::close(&mut graph, &places)?;
     let in_couplings = loops.coupling_loads(&mut graph, study);
     meaning.extend(study.couplings.iter().map(|coupling| coupling.load).zip(in_couplings));
     let loads: Vec<Node> = study.forces.iter().map(|force| force.load).collect();
@@ -267,15 +269,7 @@ fn accelerate(
 ) -> Vec<Accelerated> {
     let mut acting = Loads::none(graph, tree);
     for (geometry, &load) in geometries.iter().zip(loads) {
-        match &geometry.effect {
-            Effect::Coordinate(link) => acting.coordinates[*link] = graph.add(acting.coordinates[*link], load),
-            Effect::Links(unit) => {
-                for &(link, wrench) in unit {
-                    let wrench = wrench.scale(graph, load);
-                    acting.wrenches[link] = acting.wrenches[link].add(graph, wrench);
-                }
-            }
-        }
+        acting.act(graph, &geometry.effect, load);
     }
     for modal in &tree.modal {
         for (link, load) in modal.loads(graph, study) {

@@ -8,7 +8,10 @@ use crate::study::{Start, Study};
 use std::collections::HashMap;
 
 /// Loops count as closed below this error (m, rad).
-const CLOSED: f64 = 1e-9;
+pub(super) const CLOSED: f64 = 1e-9;
+/// Cosine of directions that a closed joint makes parallel: one as meant, minus one where the joint is turned over,
+/// zero where a joint that cannot turn closes with its axes exchanged.
+const UPRIGHT: f64 = 0.5;
 /// A step below this leads nowhere.
 const SMALLEST_STEP: f64 = 1e-14;
 const LARGEST_STEP: f64 = 0.3;
@@ -138,6 +141,11 @@ impl Linkage {
         self.freedoms.len()
     }
 
+    /// How many constraints are those of positions; they come first.
+    pub fn of_positions(&self) -> usize {
+        self.positions.len()
+    }
+
     /// The positions that a start states, as far as numbers and parameters go.
     pub fn given(&self, study: &Study, start: &Start) -> HashMap<Symbol, f64> {
         let mut given = HashMap::new();
@@ -173,7 +181,7 @@ impl Linkage {
         };
         let unstated = without(order);
         let mut moved: Vec<Vec<usize>> = (0..=order.len()).rev().map(|count| without(&order[..count])).collect();
-        moved.push(all);
+        moved.push(all.clone());
         moved.dedup();
         let mut outcome = self.close_by(&start, &moved);
         for attempt in 0..ATTEMPTS {
@@ -183,6 +191,13 @@ impl Linkage {
             self.move_far(&unstated, attempt, reach);
             let from = self.values.clone();
             outcome = self.close_by(&from, &moved).map_err(|_| residual.clone());
+        }
+        // What is stated leads nowhere, such as a guide started a third of a turn away.
+        if let Err(residual) = &outcome
+            && !given.is_empty()
+        {
+            self.values = drawn.clone();
+            outcome = self.close(&all).map_err(|_| residual.clone());
         }
         if outcome.is_ok() {
             let nearest = self.nearest_stated(&start, order, (&unstated, &moved));
@@ -250,15 +265,15 @@ impl Linkage {
         (std::mem::replace(&mut self.values, drawn), jacobian)
     }
 
-    /// The Jacobian of the constraints, m x n, column-major.
+    /// The Jacobian of the constraints on positions, m x n, column-major.
     pub fn jacobian_at(&mut self, closed: &HashMap<Symbol, f64>) -> Vec<f64> {
         let drawn = std::mem::replace(&mut self.values, closed.clone());
-        let jacobian = self.jacobian();
+        let jacobian = self.jacobian_of_first(self.of_positions());
         self.values = drawn;
         jacobian
     }
 
-    /// Jacobians in positions along the ways that the loops leave free, from a closed position.
+    /// Jacobians of the constraints on positions along the ways that the loops leave free, from a closed position.
     pub fn jacobians_along(&mut self, closed: &HashMap<Symbol, f64>, is_driven: bool) -> Vec<Vec<f64>> {
         let drawn = std::mem::replace(&mut self.values, closed.clone());
         let all: Vec<usize> = (0..self.freedoms.len()).collect();
@@ -270,7 +285,7 @@ impl Linkage {
             let mut heading: Vec<f64> =
                 all.iter().map(|&i| sign * (1.0 + 2.4 * (i + (way / 2) * all.len()) as f64).sin()).collect();
             for _ in 0..STEPS {
-                let jacobian = self.jacobian();
+                let jacobian = self.jacobian_of_first(self.of_positions());
                 let is_moving = allowed(&jacobian, &mut heading);
                 found.push(jacobian);
                 if !is_moving {
@@ -327,8 +342,8 @@ impl Linkage {
 
     /// Whether the loops leave the coordinates `moved` a motion.
     fn is_free(&mut self, closed: &HashMap<Symbol, f64>, moved: &[usize]) -> bool {
-        let m = self.positions.len();
-        let all = self.general_position(closed).1;
+        let (m, general) = (self.of_positions(), self.general_position(closed).0);
+        let all = self.jacobian_at(&general);
         let jacobian: Vec<f64> = moved.iter().flat_map(|&i| &all[i * m..(i + 1) * m]).copied().collect();
         SingularValueDecomposition::new(m, moved.len(), &jacobian).map_or(true, |svd| svd.rank(1e-7) < moved.len())
     }
@@ -397,7 +412,7 @@ impl Linkage {
         }
     }
 
-    /// Jacobians in positions through which prescribed motions lead from a closed position.
+    /// Jacobians of the constraints on positions through which prescribed motions lead from a closed position.
     fn driven(&mut self, closed: &HashMap<Symbol, f64>, found: &mut Vec<Vec<f64>>) {
         self.values = closed.clone();
         self.is_driven = true;
@@ -413,16 +428,21 @@ impl Linkage {
             if self.close(&all).is_err() {
                 break;
             }
-            found.push(self.jacobian());
+            found.push(self.jacobian_of_first(self.of_positions()));
         }
         self.is_driven = false;
     }
 
     /// dg/dt per rate: m x n, column-major.
     fn jacobian(&self) -> Vec<f64> {
+        self.jacobian_of_first(self.velocities.len())
+    }
+
+    /// Of so many constraints.
+    fn jacobian_of_first(&self, count: usize) -> Vec<f64> {
         let at = |moving: Option<Symbol>| {
             let value = |s: Symbol| if Some(s) == moving { 1.0 } else { self.values.get(&s).copied().unwrap_or(0.0) };
-            self.graph.evaluate(&self.velocities, value, self.input())
+            self.graph.evaluate(&self.velocities[..count], value, self.input())
         };
         let resting = at(None);
         let column = |rate: Symbol| at(Some(rate)).into_iter().zip(&resting).map(|(v, r)| v - r).collect::<Vec<_>>();
@@ -517,13 +537,14 @@ impl Linkage {
             self.advance(moved, &step);
             residual = self.evaluate(&self.positions);
         }
-        let is_upright = || self.evaluate(&self.upright).iter().all(|cosine| *cosine > 0.0);
+        let is_upright = || self.evaluate(&self.upright).iter().all(|cosine| *cosine > UPRIGHT);
         if largest(&residual) < CLOSED && is_upright() { Ok(()) } else { Err(residual) }
     }
 
+    /// Of the first constraints, as many as there are residuals.
     fn shortest_step(&self, residual: &[f64], moved: &[usize]) -> Option<Vec<f64>> {
         let (m, n) = (residual.len(), moved.len());
-        let all = self.jacobian();
+        let all = self.jacobian_of_first(m);
         let jacobian: Vec<f64> = moved.iter().flat_map(|&i| &all[i * m..(i + 1) * m]).copied().collect();
         if jacobian.is_empty() {
             return None;

@@ -5,6 +5,7 @@
 
 use super::articulated::{Loads, Wrench};
 use super::chain::{Chain, Ends, FreeShift, unit};
+use super::forces::Effect;
 use super::kinematics::{self, FrameMotion};
 use super::topology::{Seat, Tree};
 use crate::diagnostics::{Code, Diagnostic, Span};
@@ -55,11 +56,12 @@ pub(super) enum Form {
 /// A relation of coordinates.
 #[derive(Clone, Debug)]
 pub(super) struct Relation {
-    /// g and dg/dt.
-    pub position: Node,
+    /// g; none where only rates are related.
+    pub position: Option<Node>,
+    /// dg/dt.
     pub velocity: Node,
-    /// Links with dg/dt per rate of their coordinate: what multiplier 1 does to each.
-    pub levers: Vec<(usize, Node)>,
+    /// What multiplier 1 does: so many times each.
+    pub loads: Vec<(Node, Effect)>,
 }
 
 /// Something held between the two ends of a joint.
@@ -282,12 +284,17 @@ struct Moving {
 }
 
 impl Row {
-    /// g.
-    pub fn position(&self, graph: &mut Graph, frames: &[FrameMotion]) -> Node {
+    /// g; none where only rates are related.
+    pub fn position(&self, graph: &mut Graph, frames: &[FrameMotion]) -> Option<Node> {
         match &self.form {
-            Form::Ends(held) => held.position(graph, frames),
+            Form::Ends(held) => Some(held.position(graph, frames)),
             Form::Relation(relation) => relation.position,
         }
+    }
+
+    /// Whether it is a relation of positions, not of rates only.
+    pub fn has_position(&self) -> bool {
+        !matches!(&self.form, Form::Relation(Relation { position: None, .. }))
     }
 
     /// dg/dt.
@@ -307,9 +314,9 @@ impl Row {
                 }
             }
             Form::Relation(relation) => {
-                for &(link, lever) in &relation.levers {
-                    let load = graph.multiply(multiplier, lever);
-                    loads.coordinates[link] = graph.add(loads.coordinates[link], load);
+                for (slope, effect) in &relation.loads {
+                    let load = graph.multiply(multiplier, *slope);
+                    loads.act(graph, effect, load);
                 }
             }
         }

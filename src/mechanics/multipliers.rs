@@ -2,7 +2,7 @@
 
 use super::articulated::Loads;
 use super::assembly::{Assembly, Constraints, assemble_loops};
-use super::couplings;
+use super::couplings::{self, Places};
 use super::kinematics::{self, FrameMotion};
 use super::loops::{self, Direction, Owner, Row};
 use super::scale::typical_magnitude;
@@ -25,8 +25,9 @@ pub(super) struct Loops {
     labels: Vec<usize>,
     /// Which rows are in force where they take turns.
     pub choices: Vec<Choice>,
-    /// On velocity and on position level, one per constraint.
+    /// On velocity level, one per constraint.
     pub multipliers: Vec<Symbol>,
+    /// On position level; those of rates alone, which come last, have none.
     projections: Vec<Symbol>,
     positions: Vec<Node>,
     /// Rate of every constraint.
@@ -39,16 +40,13 @@ pub(super) struct Loops {
 }
 
 impl Loops {
-    pub fn close(
-        graph: &mut Graph,
-        study: &Study,
-        tree: &Tree,
-        frames: &[FrameMotion],
-        meaning: &HashMap<Symbol, Node>,
-    ) -> Result<Self, Vec<Diagnostic>> {
+    pub fn close(graph: &mut Graph, places: &Places) -> Result<Self, Vec<Diagnostic>> {
+        let Places { study, tree, frames, .. } = *places;
         let mut rows = loops::rows(graph, study, tree)?;
-        rows.extend(couplings::rows(graph, study, tree, frames, meaning));
-        let positions: Vec<Node> = rows.iter().map(|row| row.position(graph, frames)).collect();
+        rows.extend(couplings::rows(graph, places));
+        let positions: Vec<Option<Node>> = rows.iter().map(|row| row.position(graph, frames)).collect();
+        let on_positions = positions.iter().flatten().count();
+        let positions: Vec<Node> = positions.into_iter().flatten().collect();
         let velocities: Vec<Node> = rows.iter().map(|row| row.velocity(graph, frames)).collect();
         let upright = loops::upright(graph, study, tree, frames);
         let constraints =
@@ -56,12 +54,15 @@ impl Loops {
         let assembly = assemble_loops(graph, study, tree, &constraints)?;
         let taken = Taken::new(graph, study, tree, &assembly, (&rows, &velocities));
         let labels: Vec<usize> = taken.slots.iter().map(|slot| slot[0].0).collect();
-        let mut symbols = |word: &str| -> Vec<Symbol> {
+        let mut symbols = |word: &str, labels: &[usize]| -> Vec<Symbol> {
             let row = |at: &usize| (rows[*at].owner.name(study), &rows[*at].holds);
             labels.iter().map(row).map(|(owner, holds)| graph.symbol(&format!("{owner}.{word}: {holds}"))).collect()
         };
-        let [multipliers, projections] = ["reaction", "projection"].map(&mut symbols);
-        let [positions, velocities] = [&positions, &velocities].map(|nodes| taken.constraints(graph, nodes));
+        let multipliers = symbols("reaction", &labels);
+        let with_positions = labels.iter().take_while(|row| **row < on_positions).count();
+        let projections = symbols("projection", &labels[..with_positions]);
+        let positions = constraints_of(graph, &taken.slots[..with_positions], &positions);
+        let velocities = constraints_of(graph, &taken.slots, &velocities);
         let counting: Vec<usize> = (0..rows.len()).filter(|&row| !taken.shares(row).is_empty()).collect();
         Ok(Self {
             shares: counting.iter().map(|&row| taken.shares(row)).collect(),
@@ -84,13 +85,14 @@ impl Loops {
         self.labels.iter().map(owner).map(|owner| (owner.name(study).to_owned(), owner.span(study))).collect()
     }
 
-    /// The rows with what acts along each.
+    /// The rows with what acts along each; `multipliers` of all constraints, or of the first ones.
     pub fn acting<'l>(&'l self, graph: &mut Graph, multipliers: &[Symbol]) -> Vec<(&'l Row, Node)> {
         let mut acting = Vec::new();
         for (row, shares) in self.rows.iter().zip(&self.shares) {
             let mut sum = graph.constant(0.0);
             for &(constraint, in_force) in shares {
-                let multiplier = graph.variable(multipliers[constraint]);
+                let Some(&multiplier) = multipliers.get(constraint) else { continue };
+                let multiplier = graph.variable(multiplier);
                 let zero = graph.constant(0.0);
                 let share = graph.select(in_force, multiplier, zero);
                 sum = graph.add(sum, share);
@@ -103,8 +105,15 @@ impl Loops {
     /// Adds what the multipliers do to the links.
     pub fn load(&self, graph: &mut Graph, frames: &[FrameMotion], multipliers: &[Symbol], loads: &mut Loads) {
         for (row, multiplier) in self.acting(graph, multipliers) {
-            row.act(graph, frames, multiplier, loads);
+            if !graph.is_zero(multiplier) {
+                row.act(graph, frames, multiplier, loads);
+            }
         }
+    }
+
+    /// How many constraints are those of positions; they come first.
+    pub fn of_positions(&self) -> usize {
+        self.projections.len()
     }
 
     /// Load of every coupling, per coupling of the study: zero where others say the same.
@@ -185,15 +194,6 @@ impl Taken {
         Self { slots, choices }
     }
 
-    /// Per constraint the expression of the row in force.
-    fn constraints(&self, graph: &mut Graph, of_rows: &[Node]) -> Vec<Node> {
-        let constraint = |slot: &Vec<(usize, Node)>| {
-            let first = of_rows[slot[0].0];
-            slot.iter().skip(1).fold(first, |sum, &(row, in_force)| graph.select(in_force, of_rows[row], sum))
-        };
-        self.slots.iter().map(constraint).collect()
-    }
-
     /// Constraints that a row is, and where.
     fn shares(&self, row: usize) -> Vec<(usize, Node)> {
         let of_slot = |(number, slot): (usize, &Vec<(usize, Node)>)| {
@@ -201,6 +201,15 @@ impl Taken {
         };
         self.slots.iter().enumerate().flat_map(of_slot).collect()
     }
+}
+
+/// Per constraint the expression of the row in force.
+fn constraints_of(graph: &mut Graph, slots: &[Vec<(usize, Node)>], of_rows: &[Node]) -> Vec<Node> {
+    let constraint = |slot: &Vec<(usize, Node)>| {
+        let first = of_rows[slot[0].0];
+        slot.iter().skip(1).fold(first, |sum, &(row, in_force)| graph.select(in_force, of_rows[row], sum))
+    };
+    slots.iter().map(constraint).collect()
 }
 
 /// Unknowns without derivative, with one equation each and its name.
@@ -231,10 +240,11 @@ pub(super) fn algebraic_part(
     for (row, &symbol) in labels.iter().zip(&loops.projections) {
         algebraic.push(variable(graph, symbol, dimensions(row)[1]));
     }
-    let level = |word: &str| -> Vec<String> {
+    let level = |word: &str, labels: &[&Row]| -> Vec<String> {
         labels.iter().map(|row| format!("{word} of `{}` ({})", row.owner.name(study), row.holds)).collect()
     };
-    let mut names = [level("velocity constraint"), level("position constraint")].concat();
+    let with_positions = &labels[..loops.projections.len()];
+    let mut names = [level("velocity constraint", &labels), level("position constraint", with_positions)].concat();
     let mut constraints = [&loops.velocities[..], &loops.positions].concat();
     for (reaction, value) in reactions {
         let dimension = if reaction.is_moment { Dimension::TORQUE } else { Dimension::FORCE };

@@ -97,7 +97,7 @@ fn closing_reaction(
     let mut acting: Vec<(ForceGeometry, Node)> =
         on_joint.map(|((_, geometry), &load)| (geometry.clone(), load)).collect();
     let in_couplings = loops.coupling_loads(graph, study);
-    for (at, load) in couplings::loads_on(graph, study, &study.joints[reaction.joint], &in_couplings, meaning) {
+    for (at, load) in couplings::loads_on(graph, study, reaction.joint, &in_couplings, meaning) {
         let geometry = closing_coordinate(graph, study, tree, frames, (reaction.joint, at));
         acting.extend(geometry.map(|geometry| (geometry, load)));
     }

@@ -19,22 +19,25 @@ pub const IN_FORCE: &str = "constraints_in_force";
 /// Plain trees have no algebraic variables w: the accelerations are eliminated symbolically (articulated-body
 /// algorithm), so the system is an explicit ordinary differential equation. Closed loops add multipliers in the
 /// Gear-Gupta-Leimkuhler form (Gear-Gupta-Leimkuhler-1985): `q' = T(q) (v + G^T mu)`, `v' = a(q, v, lambda)`,
-/// `0 = G v + g_t`, `0 = g`.
+/// `0 = G v + g_t`, `0 = g`; what rolls has no
+/// g and no mu.
 #[derive(Clone, Debug)]
 pub struct System {
     pub graph: Graph,
     pub time: Symbol,
     pub states: Vec<Variable>,
     pub rates: Vec<Node>,
-    /// Multipliers of closed loops on velocity level, those on position level (Gear-Gupta-Leimkuhler), then reactions
+    /// Multipliers of constraints on velocity level, those on position level (Gear-Gupta-Leimkuhler), then reactions
     /// that loads depend on.
     pub algebraic: Vec<Variable>,
     /// One per algebraic variable: velocity constraints, position constraints, definitions of the reactions.
     pub constraints: Vec<Node>,
     /// In the study's words, one per constraint.
     pub constraint_names: Vec<String>,
-    /// Number of constraints that closed loops leave, each with one multiplier on either level.
+    /// Number of constraints that closed loops and couplings leave, each with a multiplier on velocity level ...
     pub loop_constraints: usize,
+    /// ... and so many of them, the first ones, with one on position level; the others relate rates only.
+    pub position_constraints: usize,
     /// Per such constraint the joint or coupling that it belongs to, with its place.
     pub loop_owners: Vec<(String, Span)>,
     /// What was found on the way and changes nothing: redundant constraints.

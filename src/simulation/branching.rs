@@ -43,7 +43,7 @@ struct Instant {
 /// as there are coordinates, and their determinant changes its sign where the constraints become dependent (the test
 /// for simple branch points of continuation methods).
 pub(super) fn branchings(compiled: &Compiled, bound: &mut Bound, times: &[f64], y: &[f64]) -> Vec<Branching> {
-    let constraints = compiled.system.loop_constraints;
+    let constraints = compiled.system.position_constraints;
     let kinds = compiled.model.variables().iter().map(|variable| variable.kind);
     let velocities: Vec<usize> =
         kinds.enumerate().filter(|(_, kind)| *kind == VariableKind::Velocity).map(|(i, _)| i).collect();
@@ -119,7 +119,7 @@ fn passages(instants: &[Instant]) -> Vec<Branching> {
 
 /// Slopes of the velocity constraints by the velocities: constraints x velocities, column-major.
 fn jacobian(compiled: &Compiled, bound: &mut Bound, time: f64, y: &[f64], velocities: &[usize]) -> Vec<f64> {
-    let (n, rows, first) = (y.len(), compiled.system.loop_constraints, compiled.model.state_count());
+    let (n, rows, first) = (y.len(), compiled.system.position_constraints, compiled.model.state_count());
     let entries: Vec<(usize, usize)> = bound.pattern().entries().collect();
     let mut values = vec![0.0; entries.len()];
     bound.jacobian(time, y, &vec![0.0; n], 0.0, &mut values);

@@ -299,6 +299,18 @@ fn a_start_speed_that_the_loops_do_not_allow_is_told() {
     );
 }
 
+/// A guide that cannot turn is not closed with its axes exchanged, where its angles vanish just as well.
+#[test]
+fn a_guide_does_not_close_with_its_axes_exchanged() {
+    let text = "study guided\nbody a { mass = 1 kg, inertia = 0.1 kg*m^2 }
+         joint float: free ground -> a\njoint guide: prismatic(z) ground -> a\nmeasure x = a.axis_x.x
+         manoeuvre go { for 1 s, start = rest { float.quaternion.w = 0.49, float.quaternion.x = 0.5, \
+         float.quaternion.y = 0.51, float.quaternion.z = 0.5 } }\n";
+    for start in ["w = 0.49", "w = 0.9", "w = -0.52"] {
+        assert_near(&one(&text.replace("w = 0.49", start))["x"], 1e-9, |_| 1.0);
+    }
+}
+
 /// The cure for a redundant joint that slides as well keeps its own slide beside what is let go.
 #[test]
 fn the_cure_of_a_redundant_joint_keeps_its_freedom() {

@@ -14,6 +14,7 @@ mod maximal;
 mod newton_euler;
 mod pendulum;
 mod random_states;
+mod rolling;
 mod run;
 mod spatial;
 mod text;

@@ -19,7 +19,7 @@ const fn completion(heading: &'static str, number: usize, text: &'static str) ->
     Completion { heading, number, text }
 }
 
-const COMPLETIONS: [Completion; 23] = [
+const COMPLETIONS: [Completion; 24] = [
     completion(
         "Numbers, units, expressions",
         1,
@@ -64,6 +64,15 @@ const COMPLETIONS: [Completion; 23] = [
          body camdisc { mass = 1 kg, inertia = 0.1 kg*m^2 }\njoint camshaft: revolute(y) ground -> camdisc\n\
          table cam_table(turned: angle) -> length { points = ((0 deg, 0 mm), (90, 4), (180, 9)), interpolation = cubic, extrapolation = linear }\n\
          law tooth_friction(v: angular_velocity, transmitted: torque) -> torque { param share: ratio\n = -share * abs(transmitted) * tanh(v / (0.1 rad/s)) }\n",
+    ),
+    completion(
+        "Couplings",
+        2,
+        "constant radius = 0.3 m\nbody hub { mass = 1 kg }\nbody wheel { mass = 2 kg, inertia = 0.05 kg*m^2 }\n\
+         joint slide: prismatic(x) ground -> hub\njoint axle: revolute(y) hub -> wheel\n\
+         body slider { mass = 1 kg }\nbody sledge { mass = 1 kg, inertia = 0.1 kg*m^2 }\n\
+         joint plane: axes(shift x, shift y) ground -> slider\njoint heading: revolute(z) slider -> sledge\n\
+         body ball { mass = 2 kg, inertia = 0.01 kg*m^2 }\njoint float: free ground -> ball\n",
     ),
     completion(
         "Forces, actuators, signals",

@@ -119,18 +119,27 @@ pub struct JointSymbols {
     pub inertia: Symbol,
 }
 
-/// A relation of positions that always holds: gears, racks, screws, belts, cams.
+/// A relation of positions that always holds: gears, racks, screws, belts, cams; or one of rates: rolling.
 #[derive(Clone, Debug)]
 pub struct Coupling {
     pub name: String,
     /// Left side minus right side, in terms of positions of joint axes, modes and points, elongations, time, inputs,
-    /// parameters.
+    /// parameters; of rates (linear in them) with factors of positions and axes of bodies besides.
     pub difference: Node,
-    /// Of both sides.
+    pub level: CouplingLevel,
+    /// Of both sides; of rates that of their integral.
     pub dimension: Dimension,
     /// What holds the relation: acts along the growing left side, against the growing right side.
     pub load: Symbol,
     pub span: Span,
+}
+
+/// What a coupling relates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CouplingLevel {
+    Positions,
+    /// Rates only: a rolling wheel reaches every position.
+    Rates,
 }
 
 /// What the study calls the joint; its freedom is in [`Joint::axes`] and [`Joint::rotation`].
