@@ -13,12 +13,19 @@ pub fn similar_name<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str
     best.map(|(_, candidate)| candidate)
 }
 
-/// As [`similar_name`], else a candidate of the same stem: `couple` for `coupling`.
+/// As [`similar_name`], else the shortest candidate that the word begins, or one of the same stem: `accel` for
+/// `acceleration`, `couple` for `coupling`.
 pub fn similar_word<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
     let alike = |candidate: &str| word.chars().zip(candidate.chars()).take_while(|(a, b)| a == b).count();
     let of_stem = |candidate: &&&str| alike(candidate) >= STEM && 2 * alike(candidate) > candidate.chars().count();
-    similar_name(word, candidates.iter().copied()).or_else(|| candidates.iter().find(of_stem).copied())
+    let is_begun = |candidate: &&&str| word.chars().count() >= BEGINNING && candidate.starts_with(word);
+    let begun = || candidates.iter().filter(is_begun).min_by_key(|candidate| candidate.len());
+    let similar = similar_name(word, candidates.iter().copied());
+    similar.or_else(|| begun().or_else(|| candidates.iter().find(of_stem)).copied())
 }
+
+/// Letters at least that begin a word.
+const BEGINNING: usize = 3;
 
 /// Letters at least that words of one stem share.
 const STEM: usize = 5;
@@ -52,5 +59,7 @@ mod tests {
         assert_eq!(similar_word("experimental_data", &keywords), Some("experiment"));
         assert_eq!(similar_word("expert", &keywords), None);
         assert_eq!(similar_word("cup", &keywords), None);
+        assert_eq!(similar_word("exp", &keywords), Some("experiment"));
+        assert_eq!(similar_word("ex", &keywords), None);
     }
 }

@@ -8,9 +8,9 @@
 //! (`kinematics`), forces come from the elements (`forces`), accelerations from the articulated-body algorithm
 //! (`articulated`, with modes of elastic bodies `elastic` and `modal_pass`), all on symbolic scalars, so that whatever
 //! is structurally zero vanishes. Joints that close loops are rows of constraints (`loops`), so are relations of
-//! positions and of rates (`couplings`), of which those count that are independent near the start (`assembly`, in numbers `linkage`;
-//! where a loop needs others in other positions, `selection`), with two multipliers each (`multipliers`); what joints
-//! transmit follows from the same pass (`reactions`).
+//! positions and of rates (`couplings`), of which those count that are independent near the start (`assembly`, in
+//! numbers `linkage`; where a loop needs others in other positions, `selection`), with two multipliers each, or one where
+//! only rates are held (`multipliers`); what joints transmit follows from the same pass (`reactions`).
 
 mod articulated;
 mod assemble;

@@ -93,7 +93,8 @@ impl Failure {
             ),
             Cause::NoEquilibrium => (
                 "no equilibrium was found",
-                "a body that can move without any restoring force has no equilibrium: use `start = rest { .. }` with values",
+                "something can move without restoring force, a load beyond its limit cannot balance what it carries, or the start \
+                 states too much: use `start = rest { .. }` with values, or state less",
             ),
         };
         Self {

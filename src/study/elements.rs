@@ -277,7 +277,22 @@ impl<'a> Checker<'a> {
                 .help("let it stand `on JOINT`");
             return self.fail(diagnostic, SCOPE);
         }
-        let sort = if element.role == crate::syntax::ElementRole::Actuator { "actuator" } else { "force" };
+        let is_actuator = element.role == crate::syntax::ElementRole::Actuator;
+        if let ForcePlace::Joint { joint, axis } = placed.place
+            && is_actuator
+            && self.is_prescribed(joint, axis)
+        {
+            let driven = &self.declared.joints[joint].name;
+            let message = format!("actuator `{}` cannot move joint `{}`", element.name.text, driven.text);
+            let diagnostic = Diagnostic::error(Code::WRONG_PLACE, message)
+                .label(element.name.span, "drives what moves as prescribed")
+                .secondary(driven.span, "has a `motion`")
+                .help(
+                    "leave out the `motion`, or the actuator; what a prescribed motion takes is the joint's `reaction`",
+                );
+            return self.fail(diagnostic, SCOPE);
+        }
+        let sort = if is_actuator { "actuator" } else { "force" };
         let kinds = Kinds::of(placed.motion);
         let instance = self.law_instance(law, element.name, sort, site, kinds, place_ports);
         Some(self.add_instance(instance, element.fields, &["free_length"], element.law))

@@ -81,9 +81,13 @@ impl<'a> Checker<'a> {
             Some(period) if period > 0.0 && period.is_finite() => Some(EventTrigger::Every(period)),
             // Imagined ports have no value.
             None if is_trial => Some(EventTrigger::Every(1.0)),
-            _ => {
+            known => {
+                let label = match known {
+                    Some(period) => format!("this is {period} s"),
+                    None => "not known before the simulation".to_owned(),
+                };
                 let diagnostic = Diagnostic::error(Code::EVENT_PERIOD, "the period must be a fixed positive time")
-                    .label(span, "not known before the simulation, or not positive")
+                    .label(span, label)
                     .help("write a number, `every 1 ms { .. }`, or bind the parameter to a number");
                 self.fail(diagnostic, scope)
             }

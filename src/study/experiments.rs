@@ -247,6 +247,7 @@ impl<'a> Checker<'a> {
             let message = format!("`{}` has no start value", field.path);
             let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, message)
                 .label(field.span, "not a position, velocity or state")
+                .suggest(similar_name(&field.path, self.start_names().iter().map(String::as_str)))
                 .help("name the position or velocity of a joint (`slide.velocity`) or a law's state (`strut.z`)");
             return self.fail(diagnostic, SCOPE);
         };
@@ -288,6 +289,20 @@ impl<'a> Checker<'a> {
         }
         let state = self.states.iter().find(|state| state.name == path)?;
         Some((state.symbol, state.dimension))
+    }
+
+    /// Everything that may have a start value.
+    fn start_names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.states.iter().map(|state| state.name.clone()).collect();
+        let elastic = self.bodies.iter().filter_map(|body| body.elastic.as_ref()).flat_map(|elastic| &elastic.modes);
+        let axes = self.axis_index.keys().map(String::as_str).chain(elastic.map(|mode| mode.name.as_str()));
+        names.extend(axes.flat_map(|axis| ["position", "velocity"].map(|word| format!("{axis}.{word}"))));
+        for rotation in self.topology.joints.iter().flatten().filter_map(|read| read.freedom.rotation.as_ref()) {
+            let symbols = rotation.quaternion.iter().chain(&rotation.velocity);
+            names.extend(symbols.map(|symbol| self.graph.symbol_name(*symbol).to_owned()));
+        }
+        names.sort_unstable();
+        names
     }
 
     pub fn finished_filter(&mut self) -> (Option<Filter>, bool) {

@@ -134,7 +134,8 @@ impl<'a> Checker<'a> {
         if low >= high {
             let diagnostic = Diagnostic::error(Code::BOUNDS, "the lower bound must be below the upper bound")
                 .label(line.lower.span, format!("lower: {}", show(low)))
-                .label(line.upper.span, format!("upper: {}", show(high)));
+                .label(line.upper.span, format!("upper: {}", show(high)))
+                .help("exchange them, or widen the range");
             return self.fail(diagnostic, NUMBERS);
         }
         if start < low || start > high {

@@ -223,8 +223,9 @@ impl<'a> Checker<'a> {
         let vector = match &direction.kind {
             DirectionKind::Axis { axis, negative } => return Some(unit_vector(*axis, *negative)),
             DirectionKind::OfBody { path, .. } => {
+                let label = if path.text.contains('.') { "an axis of a body" } else { "not a direction" };
                 let diagnostic = Diagnostic::error(Code::AXIS, "a direction fixed in space is needed here")
-                    .label(path.span, "an axis of a body")
+                    .label(path.span, label)
                     .help("write `x`, `y`, `z`, or three numbers");
                 return self.fail(diagnostic, SCOPE);
             }

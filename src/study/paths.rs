@@ -4,7 +4,7 @@ use super::checker::{Allowed, Checker, Entity, Key, Scope, Site};
 use super::evaluate::Typed;
 use super::kinds::{coordinate_dimension, rate_dimension};
 use super::model::{Attachment, Motion, PointMotion, PointQuantity, ReactionQuantity};
-use crate::diagnostics::{Code, Diagnostic, similar_name};
+use crate::diagnostics::{Code, Diagnostic, similar_name, similar_word};
 use crate::expression::Symbol;
 use crate::quantities::{Dimension, Unit};
 use crate::syntax::Name;
@@ -328,8 +328,28 @@ impl<'a> Checker<'a> {
         let mut points: Vec<&str> = body.points.iter().map(|point| point.key.text.as_str()).collect();
         points.push("centre_of_gravity");
         let body_name = &body.name.text;
+        let mut known = Vec::new();
+        for word in ["angular_velocity", "angular_acceleration", "axis_x", "axis_y", "axis_z"] {
+            known.push(format!("{body_name}.{word}"));
+        }
+        for place in std::iter::once(body_name.clone()).chain(points.iter().map(|point| format!("{body_name}.{point}")))
+        {
+            known.extend(["position", "velocity", "acceleration"].map(|word| format!("{place}.{word}")));
+        }
+        let components = known.iter().flat_map(|path| ["x", "y", "z"].map(|axis| format!("{path}.{axis}")));
+        let components: Vec<String> = components.collect();
+        let (path, axis) = name.text.rsplit_once('.').unwrap_or((&name.text, ""));
+        // A component is missing, or something before a component that is right is misspelt.
+        let meant = match axis {
+            _ if known.contains(&name.text) => Some(format!("{}.x", name.text)),
+            "x" | "y" | "z" => {
+                similar_name(path, known.iter().map(String::as_str)).map(|known| format!("{known}.{axis}"))
+            }
+            _ => similar_name(&name.text, components.iter().map(String::as_str)).map(str::to_owned),
+        };
         let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("`{}` is no quantity of a body", name.text))
             .label(name.span, "not known")
+            .suggest(meant.as_deref())
             .help(format!(
                 "write `{body_name}.position.z` or `{body_name}.POINT.position.z`, also with `velocity`, `acceleration` and x, y, z; \
                  of the body `angular_velocity.z`, `angular_acceleration.z`, `axis_x.z`"
@@ -339,10 +359,13 @@ impl<'a> Checker<'a> {
     }
 
     pub fn no_quantity(&mut self, name: &'a Name, quantity: &str, known: &[&str]) -> Option<Typed> {
-        let (owner, _) = self.split_path(&name.text);
-        let mut diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("`{owner}` has no `{quantity}`"))
-            .label(name.span, "not known");
-        diagnostic = diagnostic.suggest(similar_name(quantity, known.iter().copied()));
+        let (owner, written) = self.split_path(&name.text);
+        let written = written.unwrap_or(quantity);
+        let last = written.rsplit('.').next().unwrap_or(written);
+        let similar = similar_word(written, known).or_else(|| known.iter().find(|word| **word == last).copied());
+        let mut diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, format!("`{owner}` has no `{written}`"))
+            .label(name.span, "not known")
+            .suggest(similar);
         if !known.is_empty() {
             let listed: Vec<String> = known.iter().map(|word| format!("`{owner}.{word}`")).collect();
             diagnostic = diagnostic.note(format!("there is {}", listed.join(", ")));
@@ -375,7 +398,10 @@ impl<'a> Checker<'a> {
         }
         let diagnostic = Diagnostic::error(Code::NOT_IDENTIFIED, format!("`{first}` has no value"))
             .label(name.span, "neither declared nor identified")
-            .help(format!("add `{first} in LOWER .. UPPER from START` to `identify`, or `constant {first} = ..`"));
+            .help(format!(
+                "add `{first} in LOWER .. UPPER from START` to `identify`, or `constant {first} = ..`; a signal that comes with \
+                 the data is an `input`"
+            ));
         self.fail_unknown(first, diagnostic, scope)
     }
 

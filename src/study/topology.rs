@@ -303,7 +303,12 @@ impl<'a> Checker<'a> {
     pub fn is_at_broken_joint(&self, body: usize) -> bool {
         let name = &self.declared.bodies[body].name.text;
         let broken = self.declared.joints.iter().zip(&self.topology.joints).filter(|(_, read)| read.is_none());
-        let stands_at = |end: &Name| self.split_path(&end.text).0 == name;
+        let stands_at = |end: &Name| {
+            let (body, _) = self.split_path(&end.text);
+            // A misspelt body is reported at the joint.
+            let is_meant = || !self.entities.contains_key(body) && similar_name(body, [name.as_str()]).is_some();
+            body == name || is_meant()
+        };
         broken.into_iter().any(|(joint, _)| stands_at(joint.parent) || stands_at(joint.child))
     }
 

@@ -186,7 +186,12 @@ impl Context<'_> {
             return diagnostic;
         }
         let end = self.span_of(-1).end;
-        let message = format!("expected {} after `{}`", expectation(rules), self.word(-1));
+        // A unit is several tokens: `kN/m`, not its last one.
+        let head = &self.text[..end as usize];
+        let of_unit = |letter: &char| letter.is_alphanumeric() || "/*^_°%.".contains(*letter);
+        let length: usize = head.chars().rev().take_while(of_unit).map(char::len_utf8).sum();
+        let before = if self.kind(-1) == Some(TokenKind::Word) { &head[head.len() - length..] } else { self.word(-1) };
+        let message = format!("expected {} after `{before}`", expectation(rules));
         let finding = Diagnostic::error(Code::UNEXPECTED_TEXT, message)
             .label(Span { file: self.file, start: end, end }, "something is missing here");
         match self.help(rules) {

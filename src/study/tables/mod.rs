@@ -141,7 +141,8 @@ impl<'a> Checker<'a> {
         let message = format!("the points of table `{}` do not have the declared types", table.name.text);
         let diagnostic = Diagnostic::error(Code::DIMENSION_MISMATCH, message)
             .label(span, format!("from {} to {value}", arguments.join(" and ")))
-            .secondary(declared, "declared here");
+            .secondary(declared, "declared here")
+            .help("the first point that has units gives them to all: `points = ((-10 mm, 40 N), (0, 0), (10, -40))`");
         self.fail(diagnostic, SCOPE)
     }
 
