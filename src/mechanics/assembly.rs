@@ -1,7 +1,7 @@
 //! Can the loops be closed, and which of their constraints say something new? Answered near every start of the study.
 
 use super::linkage::{CLOSED, Linkage, OtherPosition};
-use super::loops::{Direction, Owner, Row};
+use super::loops::{Direction, Owner, Row, without_sign};
 use super::selection::{Group, Jacobian, groups};
 use super::topology::Tree;
 use crate::diagnostics::{Code, Diagnostic};
@@ -300,7 +300,7 @@ fn cure(joint: &Joint, (shifts, turns): (usize, usize), dropped: &[usize], rows:
     let name = &joint.name;
     let is_shift = |axis: &&JointAxis| matches!(axis.motion, AxisMotion::Shift(_));
     let turns_first = joint.axes.iter().skip_while(is_shift).any(|axis| is_shift(&axis));
-    let in_list = |axis: [f64; 3]| format!("shift {}", super::emit::axis_in_list(axis));
+    let in_list = |axis: [f64; 3]| format!("shift {}", super::emit::axis_in_list(without_sign(axis)));
     let kept = joint.axes.iter().filter(is_shift).map(|axis| in_list(axis.motion.direction()));
     let let_go = dropped.iter().filter_map(|&i| match rows[i].direction {
         Direction::Shift(axis) => Some(in_list(axis)),

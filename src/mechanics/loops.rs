@@ -169,7 +169,7 @@ fn moving_ends(graph: &mut Graph, time: Symbol, chain: &Chain) -> MovingEnds {
 
 pub(super) fn holds(direction: Direction) -> String {
     match direction {
-        Direction::Shift(axis) => format!("shifting along {}", super::emit::axis_text(axis)),
+        Direction::Shift(axis) => format!("shifting along {}", super::emit::axis_text(without_sign(axis))),
         Direction::Turn(axis) => format!("turning about {}", super::emit::axis_text(without_sign(axis))),
         Direction::Distance => "the distance of its ends".to_owned(),
         Direction::Relation(_) => "both sides equal".to_owned(),
@@ -177,7 +177,7 @@ pub(super) fn holds(direction: Direction) -> String {
 }
 
 /// An axis that is not directed: the first component that is not zero is positive.
-fn without_sign(axis: [f64; 3]) -> [f64; 3] {
+pub(super) fn without_sign(axis: [f64; 3]) -> [f64; 3] {
     let is_negative = axis.iter().find(|component| **component != 0.0).is_some_and(|component| *component < 0.0);
     if is_negative { axis.map(|component| 0.0 - component) } else { axis }
 }

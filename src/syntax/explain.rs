@@ -259,9 +259,25 @@ impl Context<'_> {
         Some(diagnostic.suggest(Some(similar)))
     }
 
+    /// A name that was taken for part of a unit, since no blank stands before its sign: `500 N/m*spring.elongation`.
+    fn product_in_unit(&self) -> Option<String> {
+        let before = self.tokens.get(..self.index)?;
+        let number = before.iter().rposition(|token| token.kind == TokenKind::Number)?;
+        let written = self.text.get(before[number].end..before.last()?.end)?;
+        let (unit, name) = written.trim_start().rsplit_once(['*', '/'])?;
+        let sign = &written[written.len() - name.len() - 1..written.len() - name.len()];
+        let is_unit = !written.trim_start().contains(char::is_whitespace) && Unit::parse(unit).is_ok();
+        is_unit.then(|| {
+            format!("`{name}` was read as part of the unit; blanks set a product apart: `{unit} {sign} {name}`")
+        })
+    }
+
     fn help(&self, rules: &[Rule]) -> Option<String> {
         let found = self.word(0);
         let operator = rules.contains(&Rule::multiply);
+        if let Some(help) = (found == ".").then(|| self.product_in_unit()).flatten() {
+            return Some(help);
+        }
         let help = match found {
             "*" if self.word(-1) == "*" => "powers are written `x^2`".to_owned(),
             "=" if operator && (self.word(1) == "=" || self.word(-1) == "=") => {
