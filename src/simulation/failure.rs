@@ -6,7 +6,8 @@ use std::fmt;
 /// Why a record could not be simulated with these parameters, in the study's words.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
-    pub experiment: String,
+    /// Experiment or manoeuvre, with its kind: [`super::Record::title`].
+    pub record: String,
     /// s
     pub time: f64,
     /// One clause, e.g. `the step size shrank to rounding level`.
@@ -28,7 +29,7 @@ pub struct Detail {
 
 impl fmt::Display for Failure {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "experiment {}: {} at t = {:.6} s", self.experiment, self.cause, self.time)?;
+        write!(formatter, "{}: {} at t = {:.6} s", self.record, self.cause, self.time)?;
         if let Some(component) = &self.component {
             write!(formatter, ", limited by {component}")?;
         }
@@ -45,7 +46,7 @@ impl fmt::Display for Failure {
 impl Failure {
     /// From the integrator's failure, with component names put in.
     pub fn from_integration(
-        experiment: &str,
+        record: &str,
         failure: &crate::integrate::Failure,
         name: impl Fn(usize) -> String,
         equation: impl Fn(usize) -> String,
@@ -98,7 +99,7 @@ impl Failure {
             ),
         };
         Self {
-            experiment: experiment.to_owned(),
+            record: record.to_owned(),
             time: failure.time,
             cause: cause.to_owned(),
             component: failure.component.map(&name),

@@ -17,6 +17,7 @@ pub struct Record {
     pub experiment: usize,
     pub name: String,
     pub role: Role,
+    /// Of the data; empty for a manoeuvre.
     pub file: PathBuf,
     pub inputs: RecordInputs,
     /// Times at which an input jumps or kinks; the integrator restarts there.
@@ -33,6 +34,12 @@ pub struct Record {
 }
 
 impl Record {
+    /// As messages name it: `experiment sweep`, `manoeuvre kerb`.
+    pub fn title(&self) -> String {
+        let kind = if self.file.as_os_str().is_empty() { "manoeuvre" } else { "experiment" };
+        format!("{kind} {}", self.name)
+    }
+
     /// Number of compared samples per channel.
     pub fn sample_count(&self) -> usize {
         self.times.len() - self.first

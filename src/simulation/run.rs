@@ -166,7 +166,7 @@ fn run(
     let name = |i: usize| compiled.model.variables()[i].name.clone();
     let blame = |bound: &Bound, failure: integrate::Failure| {
         let equation = |i: usize| with_elements(compiled, i, bound.equation_name(i));
-        let mut told = Failure::from_integration(&record.name, &failure, name, equation);
+        let mut told = Failure::from_integration(&record.title(), &failure, name, equation);
         if let Some(cause) = singular_joint(compiled, &failure.state, failure.component) {
             told.help = cause;
         }
@@ -186,7 +186,7 @@ fn run(
     let finite = channels.iter().flatten().chain(gradients.iter().flatten()).all(|value| value.is_finite());
     if !finite {
         return Err(Failure {
-            experiment: record.name.clone(),
+            record: record.title(),
             time: record.times.last().copied().unwrap_or(start.time),
             cause: "a measured quantity became infinite or not a number".to_owned(),
             component: None,
@@ -207,7 +207,7 @@ fn run(
 
 pub(super) fn no_schedule(record: &Record, time: f64) -> Failure {
     Failure {
-        experiment: record.name.clone(),
+        record: record.title(),
         time,
         cause: "the delay of a measure is negative or not a number".to_owned(),
         component: None,

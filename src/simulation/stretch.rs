@@ -152,7 +152,7 @@ impl<'a> Stretches<'a> {
         let bound = &self.dynamics.bound;
         let name = |i: usize| bound.component_name(i);
         let equation = |i: usize| bound.equation_name(i);
-        super::Failure::from_integration(&self.record.name, failure, name, equation).to_string()
+        super::Failure::from_integration(&self.record.title(), failure, name, equation).to_string()
     }
 }
 

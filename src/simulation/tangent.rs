@@ -28,7 +28,7 @@ pub(super) fn tangent(
     let blame = |bound: &Bound, failure: integrate::Failure| {
         let n = compiled.model.dimension();
         let name = |i: usize| compiled.model.variables()[i % n].name.clone();
-        Failure::from_integration(&record.name, &failure, name, |i| bound.equation_name(i % n))
+        Failure::from_integration(&record.title(), &failure, name, |i| bound.equation_name(i % n))
     };
     let mut bound = Bound::new(&compiled.model, &record.inputs, theta);
     let start = doubled_start(compiled, record, theta, direction).map_err(|failure| blame(&bound, failure))?;

@@ -2,6 +2,7 @@
 
 use crate::run::{Channels, checked, run};
 use ident::mechanics::derive;
+use ident::simulation::{Compiled, certify, manoeuvre};
 
 fn one(text: &str) -> Channels {
     run(text, &[]).swap_remove(0)
@@ -106,6 +107,22 @@ fn a_rolling_wheel_is_held_at_the_road() {
     let resting = one(&text("equilibrium { axle.position = 0 deg }"));
     assert_near(&resting["x"], 1e-9, |_| way);
     assert_near(&resting["road"], 1e-6, |_| 0.0);
+}
+
+/// Radius and stiffness identified: the gradient through rolling is that of the discrete solution.
+#[test]
+fn rolling_has_exact_gradients() {
+    let text = "study wheel\ngravity = 10 m/s^2 along (0.6, 0, -0.8)\nsolver { tolerance = 1e-8 }\n\
+        body hub { mass = 1 kg }\nbody wheel { mass = 2 kg, inertia = 0.05 kg*m^2 }\n\
+        joint slide: prismatic(x) ground -> hub\njoint axle: revolute(y) hub -> wheel\n\
+        force holding: spring on slide { stiffness = c }\ncoupling roll: wheel.velocity.x = radius * axle.velocity\n\
+        measure x [m] = slide.position\nidentify { c in 100 .. 400 N/m from 200 N/m\n radius in 0.1 .. 0.5 m from 0.3 m }\n\
+        manoeuvre go { start = rest, step = 10 ms, for 0.5 s }\ncriterion end = final(x) in go\n";
+    let study = checked(text, &[]).unwrap_or_else(|findings| panic!("{findings}"));
+    let compiled = Compiled::new(study).unwrap_or_else(|findings| panic!("{findings:?}"));
+    let record = manoeuvre(&compiled.study, 0);
+    let digits = certify(&compiled, &[&record], &[200.0, 0.3]).expect("a run").expect("parameters");
+    assert!(digits > 8.0, "{digits} digits");
 }
 
 /// What a coupling of positions does at a point is a force there: a rope that holds a boom at its tip loads the hinge.
