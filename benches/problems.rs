@@ -77,7 +77,7 @@ const P2_PEERS: Peers = Peers {
     call: 1.19,
     nominal: 0.19,
     gradient: 14.0,
-    nominal_tolerance: "4e-7",
+    nominal_tolerance: "2e-8",
     gradient_tolerance: Some("2e-6"),
     bdf_tolerance: "1e-8",
 };

@@ -40,6 +40,16 @@ const ERROR: [f64; STAGES] = [
     1.0 / 66.0,
 ];
 
+/// Difference of the solution of order 3 of the first four stages.
+const THIRD: [f64; STAGES - 1] = [
+    -0.034_490_698_858_406_554,
+    -0.043_458_252_500_075_116,
+    0.164_006_662_733_602_84,
+    -1.051_416_702_711_428,
+    3.290_069_515_436_081,
+    -2.324_710_524_099_774,
+];
+
 const fn row<const N: usize>(weights: [f64; N]) -> [(usize, f64); N] {
     let mut row = [(0, 0.0); N];
     let mut stage = 0;
@@ -54,6 +64,7 @@ const fn row<const N: usize>(weights: [f64; N]) -> [(usize, f64); N] {
 pub(super) const ROWS: [Row; STAGES - 1] =
     [&row(STAGE_2), &row(STAGE_3), &row(STAGE_4), &row(STAGE_5), &row(STAGE_6), &row(WEIGHTS)];
 pub(super) const ERROR_ROW: Row = &row(ERROR);
+pub(super) const THIRD_ROW: Row = &row(THIRD);
 
 /// The method is stable for real eigenvalues down to `-STABILITY / h`.
 pub(super) const STABILITY: f64 = 3.5;
@@ -151,6 +162,16 @@ mod tests {
             }
         }
         assert!(seen > 1e-5, "the estimate sees terms of order 5");
+    }
+
+    #[test]
+    fn the_second_estimate_has_order_3() {
+        let mut weights = THIRD.to_vec();
+        weights.push(0.0);
+        for (order, tree, density) in trees().into_iter().filter(|(order, ..)| *order <= 4) {
+            let error = dot(&weights, &tree).abs();
+            assert_eq!(error < 1e-13, order <= 3, "order {order}, density {density}: {error}");
+        }
     }
 
     #[test]

@@ -131,3 +131,71 @@ fn the_explicit_method_comes_back_when_stiffness_has_gone() {
     let bdf = integrate(&mut system, &start, &[100.0], &[], &only_bdf).unwrap();
     assert!(solution.work.steps < bdf.work.steps, "{} {}", solution.work.steps, bdf.work.steps);
 }
+
+/// A mass on a spring, driven, with dry friction that is nearly a jump: its solution bends sharply at every turn.
+struct RubbingOscillator;
+
+impl Equations for RubbingOscillator {
+    fn dimension(&self) -> usize {
+        2
+    }
+
+    fn rates<S: Scalar>(&self, t: f64, y: &[S], _theta: &[S]) -> Option<Vec<S>> {
+        let drive = S::from((1.3 * t).sin() + 0.7 * (4.1 * t + 0.5).sin());
+        let creep = y[1] / S::from(1e-3);
+        Some(vec![y[1], drive - y[0] - S::from(0.3) * creep / (S::from(1.0) + creep * creep).sqrt()])
+    }
+}
+
+impl RubbingOscillator {
+    /// At `times`, by the classical method of order 4 with steps far below the width of the bends.
+    fn fine(times: &[f64]) -> Vec<[f64; 2]> {
+        const STEP: f64 = 2e-5;
+        let rates = |t: f64, y: [f64; 2]| {
+            let drive = (1.3 * t).sin() + 0.7 * (4.1 * t + 0.5).sin();
+            let creep = y[1] / 1e-3;
+            [y[1], drive - y[0] - 0.3 * creep / (1.0 + creep * creep).sqrt()]
+        };
+        let moved = |y: [f64; 2], h: f64, k: [f64; 2]| [y[0] + h * k[0], y[1] + h * k[1]];
+        let (mut y, mut step) = ([0.5, 0.0], 0_u64);
+        let mut states = Vec::new();
+        for &time in times {
+            while (step as f64 + 0.5) * STEP < time {
+                let t = step as f64 * STEP;
+                let a = rates(t, y);
+                let b = rates(t + 0.5 * STEP, moved(y, 0.5 * STEP, a));
+                let c = rates(t + 0.5 * STEP, moved(y, 0.5 * STEP, b));
+                let d = rates(t + STEP, moved(y, STEP, c));
+                let sum = [0, 1].map(|i| (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]) / 6.0);
+                (y, step) = (moved(y, STEP, sum), step + 1);
+            }
+            states.push(y);
+        }
+        states
+    }
+}
+
+/// Where an estimate vanishes by chance at a bend, the step that crosses it must not pass for exact.
+#[test]
+fn bends_are_not_passed_by_chance() {
+    let times: Vec<f64> = (1..=200).map(|i| 0.1 * f64::from(i)).collect();
+    let exact = RubbingOscillator::fine(&times);
+    let mut system = System::new(RubbingOscillator, &[]);
+    let start = system.start(&[0.5, 0.0]);
+    let mut ratios: Vec<f64> = (0..60)
+        .map(|k| {
+            let tolerance = 1e-6 * 10f64.powf(-0.05 * f64::from(k));
+            let method = MethodChoice::RungeKutta;
+            let options = Options { relative_tolerance: tolerance, method, ..Options::default() };
+            let solution = integrate(&mut system, &start, &times, &[], &options).unwrap();
+            let states = solution.y.chunks_exact(2).zip(&exact);
+            let error =
+                states.map(|(y, exact)| (y[0] - exact[0]).abs().max((y[1] - exact[1]).abs())).fold(0.0, f64::max);
+            println!("{tolerance:.1e}: {error:.1e}, {} evaluations, {}", solution.work.residuals, solution.work.method);
+            error / tolerance
+        })
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    println!("median {}, largest {}", ratios[30], ratios[59]);
+    assert!(ratios[59] < 10.0 * ratios[30], "{ratios:?}");
+}
