@@ -220,3 +220,32 @@ fn cautions_reach_every_command() {
         assert_eq!(found, [records; 2], "{name}");
     }
 }
+
+/// The variants side by side as a page: the test against the base as in the text, and the curves of both.
+#[test]
+fn variants_are_compared_on_a_page() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let original = study("quarter_vehicle");
+    let data = original.with_file_name("data");
+    let text_of_study = std::fs::read_to_string(&original).expect("the study");
+    let variant = "\nvariant rubbing of base {\n  add effect rubbing: dry_friction on chassis_guide { F = F_rubbing, creep = 0.2 mm/s }\n  identify { F_rubbing in 0 N .. 1 kN from 60 N }\n}\n";
+    let path = folder.path().join("quarter_vehicle.ident");
+    std::fs::write(&path, text_of_study + variant).expect("written");
+    std::fs::create_dir(folder.path().join("data")).expect("a folder");
+    for file in std::fs::read_dir(data).expect("its data").flatten() {
+        std::fs::copy(file.path(), folder.path().join("data").join(file.file_name())).expect("copied");
+    }
+    let page = folder.path().join("compared.html");
+    let output = run(&["compare", "--quiet", "--html", text(&page)], &path);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let told = String::from_utf8(output.stdout).expect("text");
+    let row = told.lines().skip_while(|line| *line != "Against base").find(|line| line.trim().starts_with("rubbing"));
+    let figures: Vec<&str> = row.expect("a row of the variant").split_whitespace().collect();
+    let page = std::fs::read_to_string(page).expect("the page");
+    for part in ["<h2>Against base</h2>", "<td>rubbing</td>", "swatch variant1", "likelihood ratio"] {
+        assert!(page.contains(part), "page shows {part}");
+    }
+    let criteria: Vec<f64> = figures[1..4].iter().map(|figure| figure.parse().expect("a number")).collect();
+    assert!(criteria[0] < -100.0 && criteria[1] < -100.0 && criteria[2] > 100.0, "{criteria:?}");
+    assert!(page.contains(&format!("<td class=\"number\">{}</td>", figures[1])), "the criterion of the text");
+}

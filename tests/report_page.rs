@@ -90,7 +90,7 @@ fn page_of_a_drive_axis() {
         "viscous and slide_F move together: correlation -0.93",
         "residual [N]",
         "variant with_dry_friction of base",
-        "ident diagnose drive_axis --write",
+        "ident diagnose drive_axis.ident --write",
         "end_stop at slide",
     ] {
         assert!(page.contains(part), "page shows {part}");

@@ -1,16 +1,20 @@
 //! `ident compare STUDY`
 
 use super::fit::{SearchArguments, fit_variant};
-use super::output::answer;
+use super::output::{answer, page};
 use super::session::Session;
 use super::{Failed, StudyArguments};
 use crate::identify::{Candidate, Identification, identification, structures};
 use crate::report;
+use std::path::PathBuf;
 
 #[derive(clap::Args, Debug)]
 pub(super) struct Arguments {
     #[command(flatten)]
     study: StudyArguments,
+    /// Write the answer as one self-contained page
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
@@ -36,5 +40,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failed> {
         result.bic = structure.bic;
         result.structure = Some(structure);
     }
+    page(arguments.html.as_deref(), || report::page::comparison(&results))?;
     answer(study.format, || report::terminal::comparison(&results), || report::json::comparison(&results))
 }

@@ -77,5 +77,6 @@ fn write_extension(path: &Path, answer: &Answer) -> Result<(), Failed> {
     let name = path.display().to_string();
     let patch = similar::TextDiff::from_lines(&before, &after).unified_diff().header(&name, &name).to_string();
     eprint!("{patch}");
+    eprintln!("`ident compare {name}` shows the study with and without it");
     Ok(())
 }

@@ -8,6 +8,8 @@ use serde::Serialize;
 #[derive(Clone, Debug, JsonSchema, Serialize)]
 pub struct Answer {
     pub study: String,
+    /// The study file as it was given.
+    pub file: String,
     pub title: String,
     pub verdict: Verdict,
     /// One or two sentences for the top of a page.

@@ -23,6 +23,8 @@ const PATCHWORK: usize = 3;
 /// What was done so far.
 #[derive(Default)]
 pub(super) struct Course {
+    /// The study file.
+    pub file: String,
     pub steps: Vec<Step>,
     pub texts: Vec<String>,
     pub simulations: usize,
@@ -54,6 +56,10 @@ struct Note {
 }
 
 impl Course {
+    pub(super) fn new(file: String) -> Self {
+        Self { file, ..Self::default() }
+    }
+
     pub(super) fn accepted(&self) -> usize {
         self.texts.len()
     }
@@ -199,6 +205,7 @@ impl Course {
         }
         Answer {
             study: compiled.study.name.clone(),
+            file: self.file,
             title: compiled.study.title.clone(),
             verdict,
             summary,

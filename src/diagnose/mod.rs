@@ -116,7 +116,8 @@ pub fn diagnose(
     let first = first_model(loaded, &options.variant, compiled, &roles, observer)?;
     let base = identification(&first.compiled, &first.fitted, &roles.all());
     let anatomy = anatomy::anatomy(&first.compiled, &first.fitted, &roles.estimation());
-    let mut course = Course::default();
+    let file = loaded.sources.name(loaded.study_file()).unwrap_or_default().to_owned();
+    let mut course = Course::new(file);
     let (mut named, mut model) = (Vec::new(), first);
     // A cause that was taken out must not come back and be taken out for ever.
     while course.accepted() < options.maximum_extensions && course.steps.len() < ROUNDS * options.maximum_extensions {

@@ -83,14 +83,42 @@ pub fn standing(step: &Step, index: usize) -> String {
     }
 }
 
+/// Heads of the columns of [`structures`]; the first and the last one are text.
+pub const STRUCTURE_HEADS: [&str; 8] =
+    ["variant", "AICc", "BIC", "likelihood ratio", "p", "Vuong z", "p ", "held-out error, 95 % interval"];
+
+/// Every structure but the first one against it, a row each; empty where structures were not compared.
+pub fn structures(variants: &[Identification]) -> Vec<[String; 8]> {
+    let Some(first) = variants.first().and_then(|base| base.structure.as_ref()) else { return Vec::new() };
+    let text = |value: Option<f64>, show: &dyn Fn(f64) -> String| value.map_or_else(String::new, show);
+    let percent = |value: f64| number::signed(value, number::fixed(100.0 * value, 1));
+    let compared = variants[1..].iter().filter_map(|fit| Some((fit, fit.structure.as_ref()?)));
+    compared
+        .map(|(fit, structure)| {
+            [
+                fit.variant.clone(),
+                number::fixed(structure.aicc - first.aicc, 1),
+                number::fixed(structure.bic - first.bic, 1),
+                text(structure.likelihood_ratio, &|value| number::fixed(value, 1)),
+                text(structure.likelihood_ratio_p, &number::probability),
+                text(structure.vuong_z, &|value| number::fixed(value, 2)),
+                text(structure.vuong_p, &number::probability),
+                structure.held_out_change.map_or_else(String::new, |(change, low, high)| {
+                    format!("{} % ({} .. {})", percent(change), percent(low), percent(high))
+                }),
+            ]
+        })
+        .collect()
+}
+
 /// `before -> after` change in per cent of the value before.
 pub fn relative_change(before: f64, after: f64) -> Option<f64> {
     (before > 0.0 && before.is_finite() && after.is_finite()).then(|| 100.0 * (after / before - 1.0))
 }
 
-/// The command that writes the extension into the study's folder.
+/// The command that writes the extension into the study.
 pub fn next_step(answer: &Answer) -> Option<String> {
-    answer.extension.as_ref().map(|_| format!("ident diagnose {} --write", answer.study))
+    answer.extension.as_ref().map(|_| format!("ident diagnose {} --write", answer.file))
 }
 
 /// The verdict on a criterion in words.

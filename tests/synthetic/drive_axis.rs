@@ -229,6 +229,7 @@ pub fn drive_axis() -> Answer {
     };
     Answer {
         study: "drive_axis".into(),
+        file: "drive_axis.ident".into(),
         title: "Drive axis under position control".into(),
         verdict: Verdict::CauseNamed,
         summary: format!(

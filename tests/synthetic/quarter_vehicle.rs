@@ -170,6 +170,7 @@ pub fn quarter_vehicle() -> Answer {
     let anatomies = base.records[0].channels.iter().map(|channel| anatomy("sweep", channel, 1e-9)).collect();
     Answer {
         study: "quarter_vehicle".into(),
+        file: "studies/quarter_vehicle.ident".into(),
         title: "One wheel on a shaker".into(),
         verdict: Verdict::GroupOfCauses,
         summary: "The damper's force levels off at about 0.39 kN; whether by a force limit or by a degressive rate this data cannot tell.".into(),

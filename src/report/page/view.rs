@@ -93,6 +93,9 @@ pub struct FitPage {
 #[derive(Serialize)]
 pub struct ComparisonPage {
     title: String,
+    base: String,
+    structure_heads: [&'static str; 8],
+    structures: Vec<[String; 8]>,
     #[serde(flatten)]
     fits: FitsView,
 }
@@ -171,7 +174,13 @@ fn error_lines(fit: &Identification) -> Vec<String> {
 
 pub fn comparison(variants: &[Identification]) -> ComparisonPage {
     let names: Vec<&str> = variants.iter().map(|fit| fit.variant.as_str()).collect();
-    ComparisonPage { title: format!("Variants {}", names.join(", ")), fits: fits(&variant_curves(variants)) }
+    ComparisonPage {
+        title: format!("Variants {}", names.join(", ")),
+        base: names.first().copied().unwrap_or_default().to_owned(),
+        structure_heads: words::STRUCTURE_HEADS,
+        structures: words::structures(variants),
+        fits: fits(&variant_curves(variants)),
+    }
 }
 
 fn fits(curves: &[Curve]) -> FitsView {

@@ -179,7 +179,7 @@ fn next(sheet: &mut Sheet, answer: &Answer) {
     extension.lines().for_each(|line| sheet.line(&format!("  {line}")));
     if let Some(command) = words::next_step(answer) {
         sheet.heading("Next");
-        sheet.line(&format!("  {command}    puts it into the study's folder"));
+        sheet.line(&format!("  {command}    puts it into the study as a variant"));
     }
     sheet.line("");
     sheet.line(&format!("{} simulations", number::count(answer.simulations)));

@@ -259,38 +259,16 @@ fn bic_difference(fit: &Identification, base: &Identification) -> String {
 }
 
 fn structure_section(sheet: &mut Sheet, variants: &[Identification]) {
-    let Some(first) = variants.first().and_then(|base| base.structure.as_ref()) else { return };
-    if variants.len() < 2 {
+    let rows = words::structures(variants);
+    if rows.is_empty() {
         return;
     }
     sheet.heading(&format!("Against {}", variants[0].variant));
-    let mut table = Table::new(&[
-        ("variant", Lean::Left),
-        ("AICc", Lean::Right),
-        ("BIC", Lean::Right),
-        ("likelihood ratio", Lean::Right),
-        ("p", Lean::Right),
-        ("Vuong z", Lean::Right),
-        ("p ", Lean::Right),
-        ("held-out error, 95 % interval", Lean::Left),
-    ]);
-    for fit in &variants[1..] {
-        let Some(structure) = &fit.structure else { continue };
-        let text = |value: Option<f64>, show: &dyn Fn(f64) -> String| value.map_or_else(String::new, show);
-        let percent = |value: f64| number::signed(value, number::fixed(100.0 * value, 1));
-        table.row(vec![
-            fit.variant.clone(),
-            number::fixed(structure.aicc - first.aicc, 1),
-            number::fixed(structure.bic - first.bic, 1),
-            text(structure.likelihood_ratio, &|value| number::fixed(value, 1)),
-            text(structure.likelihood_ratio_p, &number::probability),
-            text(structure.vuong_z, &|value| number::fixed(value, 2)),
-            text(structure.vuong_p, &number::probability),
-            structure.held_out_change.map_or_else(String::new, |(change, low, high)| {
-                format!("{} % ({} .. {})", percent(change), percent(low), percent(high))
-            }),
-        ]);
-    }
+    let last = words::STRUCTURE_HEADS.len() - 1;
+    let lean = |column| if column == 0 || column == last { Lean::Left } else { Lean::Right };
+    let heads = words::STRUCTURE_HEADS.iter().enumerate().map(|(column, head)| (*head, lean(column)));
+    let mut table = Table::new(&heads.collect::<Vec<_>>());
+    rows.into_iter().for_each(|row| table.row(row.to_vec()));
     sheet.table(&table, 2);
 }
 
