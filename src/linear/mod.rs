@@ -3,6 +3,7 @@
 mod basis;
 mod dense_block;
 mod dense_lu;
+mod determinant;
 mod factorisation;
 mod pattern;
 mod products;
@@ -11,6 +12,7 @@ mod sparse_lu;
 mod svd;
 
 pub use basis::{Basis, least_squares, perpendicular};
+pub use determinant::sign_of_determinant;
 pub use factorisation::{Factorisation, SingularMatrix};
 pub use pattern::SparsityPattern;
 pub use products::{RowOrder, combine};

@@ -2,7 +2,7 @@
 
 use super::run::Compiled;
 use crate::integrate::Dynamics;
-use crate::linear::SingularValueDecomposition;
+use crate::linear::{self, SingularValueDecomposition};
 use crate::mechanics::VariableKind;
 use crate::tape::Bound;
 
@@ -190,28 +190,12 @@ fn across(others: &[Vec<f64>], vector: &[f64], least: f64) -> Option<Vec<f64>> {
     (length > least).then_some(rest)
 }
 
-/// Of the square matrix with the constraints as its first rows and the directions as the others; by elimination with
-/// pivots.
+/// Of the square matrix with the constraints as its first rows and the directions as the others.
 fn sign_of_determinant(jacobian: &[f64], rows: usize, directions: &[Vec<f64>]) -> f64 {
-    let of_row = |row: usize| jacobian.iter().skip(row).step_by(rows).copied().collect::<Vec<f64>>();
-    let mut matrix: Vec<Vec<f64>> = (0..rows).map(of_row).chain(directions.iter().cloned()).collect();
-    let mut sign = 1.0;
-    for column in 0..matrix.len() {
-        let largest =
-            (column..matrix.len()).max_by(|&a, &b| matrix[a][column].abs().total_cmp(&matrix[b][column].abs()));
-        let Some(pivot) = largest.filter(|&row| matrix[row][column] != 0.0) else { return 0.0 };
-        if pivot != column {
-            matrix.swap(pivot, column);
-            sign = -sign;
-        }
-        let own = matrix[column].clone();
-        sign *= own[column].signum();
-        for row in &mut matrix[column + 1..] {
-            let factor = row[column] / own[column];
-            row.iter_mut().zip(&own).for_each(|(value, own)| *value -= factor * own);
-        }
-    }
-    sign
+    let n = jacobian.len() / rows;
+    let column =
+        |k: usize| jacobian[k * rows..(k + 1) * rows].iter().copied().chain(directions.iter().map(move |d| d[k]));
+    linear::sign_of_determinant(n, &(0..n).flat_map(column).collect::<Vec<f64>>())
 }
 
 #[cfg(test)]

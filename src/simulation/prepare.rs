@@ -204,6 +204,7 @@ fn inputs(
             }
             Err(error) => findings.push(
                 error
+                    .of_element(&input.name)
                     .diagnostic(Some(experiment.data_span))
                     .secondary(input.span, format!("input `{}` is declared here", input.name)),
             ),
@@ -231,6 +232,7 @@ fn measured(
             Ok(values) => channels.push(values),
             Err(error) => findings.push(
                 error
+                    .of_element(&measure.name)
                     .diagnostic(Some(experiment.data_span))
                     .secondary(measure.span, format!("measure `{}` is declared here", measure.name)),
             ),

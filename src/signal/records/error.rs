@@ -19,6 +19,14 @@ pub struct DataError {
 }
 
 impl DataError {
+    /// Of a column that the study binds to an input or measure of another name: the help binds that one.
+    pub fn of_element(mut self, element: &str) -> Self {
+        if let Some(column) = &self.column {
+            self.help = self.help.replace(&format!("columns = {{ {column} = "), &format!("columns = {{ {element} = "));
+        }
+        self
+    }
+
     pub(super) fn new(
         code: &'static Code,
         file: &Path,
