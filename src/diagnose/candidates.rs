@@ -13,6 +13,8 @@ use std::fmt::Write;
 const ALONG: f64 = 1e-9;
 /// Amplitudes of effects that declare no range may grow to this multiple of their natural scale.
 const AMPLITUDE_REACH: f64 = 1000.0;
+/// Shortest period along a rounded value, in the steps of its rounding.
+const STEPS_PER_PERIOD: f64 = 4.0;
 /// Significant digits of numbers in generated text.
 const DIGITS: usize = 6;
 /// A number held fixed may be off by this factor either way.
@@ -343,7 +345,14 @@ fn shape(element: &str, parameter: &EffectParameter, place: &Place, typical: &Ty
         }
         None => None,
     };
-    let (lower, upper) = parameter.range.or(relative).or(scale.map(|scale| (0.1 * scale, 2.0 * scale)))?;
+    let (mut lower, upper) = parameter.range.or(relative).or(scale.map(|scale| (0.1 * scale, 2.0 * scale)))?;
+    if parameter.periodic {
+        // The errors of rounding repeat along the value, too, with the step and its fractions as periods.
+        lower = lower.max(typical.resolution.map_or(0.0, |step| STEPS_PER_PERIOD * step));
+        if lower >= upper {
+            return None;
+        }
+    }
     let is_frequency = parameter.monomial.is_empty() && dimension == (Dimension { time: -1, ..Dimension::default() });
     let role = if is_frequency {
         UnknownRole::Frequency

@@ -115,7 +115,7 @@ mod tests {
     use super::super::{adopt, candidates, first_model, refit, round::Round, screen, typical};
     use super::{Model, Roles, eliminate};
     use crate::diagnose::course::Course;
-    use crate::simulation::{Compiled, prepare, probe};
+    use crate::simulation::{Compiled, prepare};
     use crate::study::{check, load};
     use std::fmt::Write;
 
@@ -170,9 +170,10 @@ identify {
     fn accept(model: &Model, name: &str, roles: &Roles) -> Model {
         let records = roles.estimation();
         let round = Round::new(&model.loaded, &model.variant, &model.compiled, &records, &model.fitted);
-        let probed: Vec<_> =
-            records.iter().filter_map(|record| probe(&model.compiled, record, &model.fitted.theta).ok()).collect();
-        let all = candidates::candidates(&model.compiled.study, &typical::typical(&model.compiled, &probed));
+        let all = candidates::candidates(
+            &model.compiled.study,
+            &typical::typical(&model.compiled, &records, &model.fitted.theta),
+        );
         let index = all.iter().position(|candidate| candidate.name == name).expect("it is a candidate");
         let screened = screen::screen(&round, &all[index]).expect("it can be screened");
         let refitted = refit::refit(&round, index, &all[index], &screened, None, 30).expect("it can be fitted");

@@ -29,7 +29,7 @@ pub use answer::*;
 use crate::diagnostics::Diagnostic;
 use crate::fit::Control;
 use crate::identify::{Fitted, Settings, fit, identification};
-use crate::simulation::{Compiled, Record, probe};
+use crate::simulation::{Compiled, Record};
 use crate::statistics::ErrorChange;
 use crate::study::{self, Loaded};
 use course::Course;
@@ -42,6 +42,10 @@ use round::Round;
 /// Candidates that get a short refit after the screen, and those of them that get a full one.
 const SHORT_REFITS: usize = 16;
 const FULL_REFITS: usize = 8;
+/// Besides, so many get a short one whose score promises much though no finite strength kept it in the screen, where
+/// fitted parameters move along to first order only; and the least score that counts as a promise.
+const PROMISING_REFITS: usize = 2;
+const PROMISING_SCORE: f64 = 25.0;
 const SHORT_ITERATIONS: usize = 3;
 const FULL_ITERATIONS: usize = 30;
 
@@ -201,9 +205,10 @@ fn extend(
 ) -> Result<Option<Model>, Vec<Diagnostic>> {
     let records = roles.estimation();
     let round = Round::new(&model.loaded, &model.variant, &model.compiled, &records, &model.fitted);
-    let probed: Vec<_> =
-        records.iter().filter_map(|record| probe(&model.compiled, record, &model.fitted.theta).ok()).collect();
-    let mut candidates = candidates::candidates(&model.compiled.study, &typical::typical(&model.compiled, &probed));
+    let mut candidates = candidates::candidates(
+        &model.compiled.study,
+        &typical::typical(&model.compiled, &records, &model.fitted.theta),
+    );
     let mut screened = screen_all(&round, &candidates, observer);
     course.simulations += screened.iter().flatten().map(|entry| entry.simulations).sum::<usize>();
     screen::merge_equal(&mut candidates, &mut screened, round.current_deviance());
@@ -259,14 +264,20 @@ fn refit_best(
     screened: &[Option<screen::Screened>],
     observer: Observer,
 ) -> Vec<Refitted> {
-    let mut order: Vec<(usize, &screen::Screened)> = screened
-        .iter()
-        .enumerate()
-        .filter_map(|(index, entry)| entry.as_ref().map(|entry| (index, entry)))
-        .filter(|(_, entry)| entry.deviance < round.current_deviance())
-        .collect();
+    let all = screened.iter().enumerate().filter_map(|(index, entry)| entry.as_ref().map(|entry| (index, entry)));
+    let (mut order, mut others): (Vec<_>, Vec<_>) =
+        all.partition(|(_, entry)| entry.deviance < round.current_deviance());
     order.sort_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance));
-    order.truncate(SHORT_REFITS);
+    others.extend(order.split_off(order.len().min(SHORT_REFITS)));
+    let score = |entry: &screen::Screened| entry.score.map_or(0.0, |(statistic, _)| statistic);
+    others.retain(|(_, entry)| score(entry) > PROMISING_SCORE);
+    others.sort_by(|a, b| score(b.1).total_cmp(&score(a.1)));
+    let promising: Vec<(usize, screen::Screened)> = others
+        .into_iter()
+        .take(PROMISING_REFITS)
+        .map(|(index, entry)| (index, entry.without_strength(&candidates[index])))
+        .collect();
+    order.extend(promising.iter().map(|(index, entry)| (*index, entry)));
     observer(Event::Refitting { candidates: order.len() });
     let mut short: Vec<Refitted> = order
         .par_iter()

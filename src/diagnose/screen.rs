@@ -90,6 +90,15 @@ pub(super) fn merge_equal(candidates: &mut [Candidate], screened: &mut [Option<S
 }
 
 impl Screened {
+    /// At its shapes, but with strengths at their neutral values: where a refit can follow the score.
+    pub(super) fn without_strength(&self, candidate: &Candidate) -> Self {
+        let at = |(value, unknown): (&f64, &Unknown)| match unknown.role {
+            UnknownRole::Amplitude => unknown.neutral,
+            _ => *value,
+        };
+        Self { values: self.values.iter().zip(&candidate.unknowns).map(at).collect(), ..self.clone() }
+    }
+
     /// Other strengths, but the very same change of all channels, and one that shows.
     fn changes_as(&self, other: &Self) -> bool {
         let close = |a: f64, b: f64| (a - b).abs() <= EQUAL * a.abs().max(b.abs());

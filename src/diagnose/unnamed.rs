@@ -14,7 +14,7 @@ use super::{Event, FULL_ITERATIONS, Model, Observer, adopt, refit, typical};
 use crate::diagnostics::Diagnostic;
 use crate::identify::{Fitted, predicted_shares};
 use crate::signal::effective_count;
-use crate::simulation::{Record, probe};
+use crate::simulation::Record;
 use crate::statistics::ErrorChange;
 use rayon::prelude::*;
 
@@ -82,9 +82,8 @@ fn trial(
 ) -> Result<Option<Model>, Vec<Diagnostic>> {
     let records = roles.estimation();
     let round = Round::new(&model.loaded, &model.variant, &model.compiled, &records, &model.fitted);
-    let probed: Vec<_> =
-        records.iter().filter_map(|record| probe(&model.compiled, record, &model.fitted.theta).ok()).collect();
-    let mut candidates = candidates::unnamed(&model.compiled.study, &typical::typical(&model.compiled, &probed));
+    let mut candidates =
+        candidates::unnamed(&model.compiled.study, &typical::typical(&model.compiled, &records, &model.fitted.theta));
     let mut screened = super::screen_all(&round, &candidates, observer);
     course.simulations += screened.iter().flatten().map(|entry| entry.simulations).sum::<usize>();
     screen::merge_equal(&mut candidates, &mut screened, round.current_deviance());

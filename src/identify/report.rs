@@ -5,7 +5,9 @@ use super::constraints::active_constraints;
 use super::errors::error_report;
 use super::fitting::{Fitted, prefilters};
 use super::problem::Problem;
+use super::resolution::resolution;
 use super::{ChannelFit, DiscrepancyNode, Identification, ParameterEstimate, RecordFit};
+use crate::quantities::format_number;
 use crate::signal::AutoRegression;
 use crate::simulation::{Compiled, Record, Trajectory, certify};
 use crate::study::{ErrorDefinition, Group, Role};
@@ -27,6 +29,7 @@ pub fn identification(compiled: &Compiled, fitted: &Fitted, records: &[&Record])
         }
     }
     remarks.extend(super::suspicious::remarks(&fits));
+    remarks.extend(unstated_rounding(compiled, &fits));
     remarks.extend(parameter_remarks(compiled, fitted, &confidence));
     remarks.extend(way_remarks(compiled, fitted, &confidence));
     let estimation: Vec<&Record> = records.iter().copied().filter(|r| r.role == Role::Estimation).collect();
@@ -217,6 +220,28 @@ fn rounding_remarks(compiled: &Compiled, fitted: &Fitted, confidence: &Confidenc
                 measure.unit.symbol,
                 100.0 * share.min(1.0)
             ))
+        })
+        .collect()
+}
+
+/// Channels that were rounded to steps of which the study does not know, where these make much of what is left.
+fn unstated_rounding(compiled: &Compiled, fits: &[RecordFit]) -> Vec<String> {
+    let unaware = compiled.study.measures.iter().filter(|measure| measure.quantisation.is_none());
+    unaware
+        .filter_map(|measure| {
+            let channels = fits.iter().flat_map(|fit| &fit.channels).filter(|channel| channel.name == measure.name);
+            let (step, share) = channels
+                .filter_map(|channel| {
+                    let step = resolution(&channel.measured)?;
+                    Some((step, (step / 12f64.sqrt() / channel.residual_rms).powi(2)))
+                })
+                .max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let (name, unit, step) = (&measure.name, &measure.unit.symbol, format_number(step, 3));
+            (share > MOSTLY_ROUNDING).then(|| {
+                format!(
+                    "{name} comes in steps of {step} {unit}, which make most of what is left of it: `quantisation = {step} {unit}` in the measure tells the model"
+                )
+            })
         })
         .collect()
 }
