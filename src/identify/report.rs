@@ -230,14 +230,15 @@ fn unstated_rounding(compiled: &Compiled, fits: &[RecordFit]) -> Vec<String> {
     unaware
         .filter_map(|measure| {
             let channels = fits.iter().flat_map(|fit| &fit.channels).filter(|channel| channel.name == measure.name);
-            let (step, share) = channels
-                .filter_map(|channel| {
-                    let step = resolution(&channel.measured)?;
-                    Some((step, (step / 12f64.sqrt() / channel.residual_rms).powi(2)))
-                })
-                .max_by(|a, b| a.1.total_cmp(&b.1))?;
-            let (name, unit, step) = (&measure.name, &measure.unit.symbol, format_number(step, 3));
-            (share > MOSTLY_ROUNDING).then(|| {
+            // A model that leaves far less than rounding would has the steps itself, such as a switch.
+            let makes_most = |step: &f64, rms: f64| {
+                (MOSTLY_ROUNDING..1.0 / MOSTLY_ROUNDING).contains(&(step / 12f64.sqrt() / rms).powi(2))
+            };
+            let steps = channels
+                .filter_map(|channel| resolution(&channel.measured).filter(|step| makes_most(step, channel.residual_rms)));
+            let (name, unit) = (&measure.name, &measure.unit.symbol);
+            steps.max_by(f64::total_cmp).map(|step| {
+                let step = format_number(step, 3);
                 format!(
                     "{name} comes in steps of {step} {unit}, which make most of what is left of it: `quantisation = {step} {unit}` in the measure tells the model"
                 )
